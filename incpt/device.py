@@ -1,0 +1,226 @@
+"""The OpenCL device: choose one, build the kernels of cl/, launch them, move arrays.
+
+Everything that differs between devices stands in `Tuning`, chosen once by the kind of device.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import resources
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from incpt import layout, pocl
+from incpt.errors import DeviceError, InputError
+
+DEVICE_VARIABLE = "INCPT_DEVICE"
+
+# Relaxed arithmetic only where NaN and infinity keep their meaning: -cl-fast-relaxed-math loses rays.
+_BUILD_OPTIONS = ["-cl-std=CL1.2", "-cl-mad-enable", "-cl-no-signed-zeros"]
+_INCLUDE = re.compile(r'^#include "(\w+)\.cl"$', re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What suits a kind of device. `chunk_paths`: paths traced at a time, so that their state stays in
+    the caches of a CPU and fills a GPU; `work_group`: work-items per group of the path kernels."""
+
+    chunk_paths: int
+    work_group: int
+
+
+_CPU = Tuning(chunk_paths=1 << 16, work_group=layout.WORK_GROUP_SIZE)
+_GPU = Tuning(chunk_paths=1 << 20, work_group=layout.WORK_GROUP_SIZE)
+
+
+class Device:
+    """An OpenCL device with the kernels built for it.
+
+    `choice` is an index or a part of the name as `incpt devices` shows them; None takes INCPT_DEVICE,
+    else the first GPU, else the first device. Raises InputError where no device has that name, and
+    DeviceError where there is none at all.
+    """
+
+    def __init__(self, choice: str | int | None = None) -> None:
+        self.cl_device = choose(choice)
+        self.target = pocl.name_target(self.cl_device)
+        try:
+            self.context = cl.Context([self.cl_device])
+            self.queue = cl.CommandQueue(self.context)
+        except cl.Error as error:
+            raise DeviceError(f"device {self.name!r} cannot be opened: {error}; try another --device") from error
+        self._kernels: dict[str, cl.Kernel] = {}
+
+    @property
+    def name(self) -> str:
+        return device_name(self.cl_device)
+
+    @property
+    def is_cpu(self) -> bool:
+        return bool(self.cl_device.type & cl.device_type.CPU)
+
+    @property
+    def is_pocl(self) -> bool:
+        return "pocl" in self.cl_device.platform.version.lower()
+
+    @cached_property
+    def tuning(self) -> Tuning:
+        return _CPU if self.is_cpu else _GPU
+
+    def kernel(self, name: str, file: str | None = None) -> cl.Kernel:
+        """The kernel `name` of cl/`file`.cl (of cl/`name`.cl by default), built at its first use.
+
+        Raises DeviceError with the compiler's first error where it does not build.
+        """
+        if name not in self._kernels:
+            program = self._build(file or name)
+            # cl.Kernel(program, name), fetched once: attribute access makes a new one each time.
+            for kernel_name in program.kernel_names.split(";"):
+                self._kernels[kernel_name] = cl.Kernel(program, kernel_name)
+        return self._kernels[name]
+
+    def launch(self, kernel: cl.Kernel, size: int, *args: Any, work_group: int | None = None) -> None:
+        """Enqueue `size` work-items, rounded up to whole groups; args are buffers and numpy scalars."""
+        group = work_group or self.tuning.work_group
+        try:
+            kernel(self.queue, (-(-size // group) * group,), (group,), *args)
+        except cl.Error as error:
+            raise DeviceError(_explain(error, f"kernel {kernel.function_name}")) from error
+
+    def empty(self, nbytes: int) -> cl.Buffer:
+        """An uninitialised buffer, at least 4 bytes. Raises DeviceError where memory runs out."""
+        nbytes = max(int(nbytes), 4)
+        limit = self.cl_device.max_mem_alloc_size
+        if nbytes > limit:
+            raise DeviceError(
+                f"device memory: one buffer of {nbytes / 2**20:,.0f} MiB is over the {limit / 2**20:,.0f} MiB "
+                f"that {self.name} allows; use a smaller image or scene"
+            )
+        try:
+            return cl.Buffer(self.context, cl.mem_flags.READ_WRITE, nbytes)
+        except cl.Error as error:
+            raise DeviceError(_explain(error, f"a buffer of {nbytes / 2**20:,.1f} MiB")) from error
+
+    def upload(self, array: npt.NDArray[Any]) -> cl.Buffer:
+        """A new buffer with the bytes of `array`."""
+        buffer = self.empty(array.nbytes)
+        if array.nbytes:
+            self.write(buffer, array)
+        return buffer
+
+    def write(self, buffer: cl.Buffer, array: npt.NDArray[Any], offset: int = 0) -> None:
+        """Copy `array` into `buffer`, `offset` bytes from its start."""
+        try:
+            cl.enqueue_copy(self.queue, buffer, np.ascontiguousarray(array), dst_offset=offset)
+        except cl.Error as error:
+            raise DeviceError(_explain(error, "an upload")) from error
+
+    def read(self, buffer: cl.Buffer, array: npt.NDArray[Any], offset: int = 0) -> npt.NDArray[Any]:
+        """Fill `array` from `buffer`, `offset` bytes from its start, once all earlier work is done."""
+        try:
+            cl.enqueue_copy(self.queue, array, buffer, src_offset=offset)
+        except cl.Error as error:
+            raise DeviceError(_explain(error, "a read")) from error
+        return array
+
+    def fill(self, buffer: cl.Buffer, value: int, nbytes: int, offset: int = 0) -> None:
+        """Set `nbytes` of `buffer` to the 32-bit pattern `value`."""
+        cl.enqueue_fill_buffer(self.queue, buffer, np.uint32(value), offset, nbytes)
+
+    def finish(self) -> None:
+        """Wait until everything that was enqueued is done."""
+        try:
+            self.queue.finish()
+        except cl.Error as error:
+            raise DeviceError(_explain(error, "the device")) from error
+
+    def _build(self, file: str) -> cl.Program:
+        # The target is part of the source, so that a kernel cached for another processor is not taken.
+        text = f"// target: {self.target}\n#line 1 \"layout.py\"\n{layout.c_header()}\n{source(file)}"
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", cl.CompilerWarning)
+                return cl.Program(self.context, text).build(options=_BUILD_OPTIONS)
+        except cl.Error as error:
+            raise DeviceError(f"cl/{file}.cl does not build on {self.name}: {_first_error(str(error))}") from error
+
+
+def source(file: str, included: set[str] | None = None) -> str:
+    """The text of cl/`file`.cl with its includes put in, each once.
+
+    Done here and not by -I, which a path with a space or a zipped package would defeat.
+    """
+    included = set() if included is None else included
+    included.add(file)
+    text = (resources.files("incpt.cl") / f"{file}.cl").read_text("utf-8")
+
+    def include(match: re.Match[str]) -> str:
+        name = match.group(1)
+        if name in included:
+            return ""
+        line = text.count("\n", 0, match.end()) + 2
+        return f'{source(name, included)}\n#line {line} "{file}.cl"'
+
+    return f'#line 1 "{file}.cl"\n' + _INCLUDE.sub(include, text)
+
+
+def all_devices() -> list[cl.Device]:
+    """Every OpenCL device of the machine, GPUs first, in the order of `incpt devices`."""
+    try:
+        platforms = cl.get_platforms()
+    except cl.Error:
+        platforms = []
+    found = []
+    for platform in platforms:
+        try:
+            found += platform.get_devices()
+        except cl.Error:
+            continue  # a platform without a device says so by an error
+    return sorted(found, key=lambda device: not device.type & cl.device_type.GPU)
+
+
+def device_name(cl_device: cl.Device) -> str:
+    """Platform and device as a user sees them."""
+    return f"{cl_device.platform.name.strip()}: {cl_device.name.strip()}"
+
+
+def choose(choice: str | int | None = None) -> cl.Device:
+    """The device that `choice` (index or part of the name), INCPT_DEVICE or the default order names."""
+    devices = all_devices()
+    if not devices:
+        raise DeviceError('no OpenCL device was found; install one, e.g. pip install "pyopencl[pocl]"')
+    origin = "--device"
+    if choice is None and os.environ.get(DEVICE_VARIABLE):
+        choice, origin = os.environ[DEVICE_VARIABLE], DEVICE_VARIABLE
+    if choice is None:
+        return devices[0]
+    text = str(choice).strip()
+    if text.isdecimal() and int(text) < len(devices):
+        return devices[int(text)]
+    if not text.isdecimal():
+        for device in devices:
+            if text.lower() in device_name(device).lower():
+                return device
+    listed = "; ".join(f"{i} = {device_name(device)}" for i, device in enumerate(devices))
+    raise InputError(f"{origin}: no device {text!r}; choose one of {listed}")
+
+
+def _explain(error: cl.Error, what: str) -> str:
+    text = str(error)
+    if any(word in text for word in ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES", "OUT_OF_HOST_MEMORY")):
+        return f"device memory ran out for {what}; use a smaller image or scene, or another --device"
+    return f"{what} failed: {text.splitlines()[0]}"
+
+
+def _first_error(log: str) -> str:
+    for line in log.splitlines():
+        if "error:" in line:
+            return line.strip()
+    return log.strip().splitlines()[0]

@@ -1,0 +1,319 @@
+"""Memory layouts that the host and the kernels share, each written down once.
+
+Every struct is a packed numpy dtype of 4-byte scalars; `c_header()` turns all of them into the
+OpenCL C header that every kernel includes, with a size assertion per struct, so that the two sides
+cannot drift. Vectors and bools are left out on purpose: their layout differs between compilers, and
+vector values keep PoCL from running work-items as SIMD lanes.
+
+The state of paths is kept as *planes*: plane `p` of path `i` is `buffer[p * stride + i]`. Neighbouring
+work-items then touch neighbouring floats, which GPUs coalesce and PoCL vectorises.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum, IntFlag
+
+import numpy as np
+
+BVH_WIDTH = 8
+"""Children per node and triangles per pack: one float8 register."""
+
+NODE_EMPTY = 0xFFFFFFFF
+"""Child reference of an unused place in a node (its box is inverted, so that no ray enters it)."""
+NODE_LEAF = 0x80000000
+"""Flag of a child reference: the other bits are a pack (bottom level) or an object (top level)."""
+NO_INDEX = 0xFFFFFFFF
+"""'None' for every unsigned index: no hit, no triangle, no normals, no medium."""
+
+WORK_GROUP_SIZE = 64
+"""Work-items per group of the path kernels; lists of paths are padded to a multiple of it."""
+
+MEDIUM_STACK_SIZE = 4
+"""Dielectrics that may enclose a point at the same time (Falcor keeps two)."""
+MEDIUM_NONE = 0xFFFF
+"""An unused place in the 16-bit medium stack; so at most 65,535 materials."""
+
+ALBEDO_TABLE_SIZE = 32
+"""Resolution of the specular albedo table in cosine and in roughness (see `albedo.py`)."""
+ENVIRONMENT_MAX_SIZE = 4096
+"""Largest width or height of an environment image; the kernels' binary search takes log2 of it steps."""
+ENVIRONMENT_SEARCH_STEPS = 12
+
+
+class RayPlane(IntEnum):
+    """Planes of the ray that a path follows next. World space; the direction has unit length."""
+
+    ORIGIN_X = 0
+    ORIGIN_Y = 1
+    ORIGIN_Z = 2
+    DIRECTION_X = 3
+    DIRECTION_Y = 4
+    DIRECTION_Z = 5
+
+
+class HitPlane(IntEnum):
+    """Planes of the nearest hit, in world space.
+
+    The geometric normal follows the winding of the face; the shading normal lies on its side.
+    OFFSET bounds the rounding error of POSITION: a ray that leaves the surface starts that far
+    along the geometric normal. OBJECT is NO_INDEX (as uint) where the ray left the scene.
+    """
+
+    DISTANCE = 0
+    POSITION_X = 1
+    POSITION_Y = 2
+    POSITION_Z = 3
+    GEOMETRIC_X = 4
+    GEOMETRIC_Y = 5
+    GEOMETRIC_Z = 6
+    SHADING_X = 7
+    SHADING_Y = 8
+    SHADING_Z = 9
+    OFFSET = 10
+    OBJECT = 11
+    MATERIAL = 12
+    TRIANGLE = 13
+
+
+class PathPlane(IntEnum):
+    """Planes of what a path carries from hit to hit. Uints are stored bit for bit in the floats.
+
+    BSDF_PDF is the solid-angle density with which the current ray was chosen; 0 marks a ray that
+    light sampling could not have found (camera ray, smooth dielectric), whose emission counts whole.
+    COUNTS packs scattering events (bits 0..7), dielectric passages (8..15) and rays (16..23).
+    MEDIUM_0 and MEDIUM_1 hold the stack of enclosing dielectrics, four 16-bit material indices.
+    """
+
+    THROUGHPUT_R = 0
+    THROUGHPUT_G = 1
+    THROUGHPUT_B = 2
+    BSDF_PDF = 3
+    PIXEL = 4
+    SAMPLE = 5
+    COUNTS = 6
+    MEDIUM_0 = 7
+    MEDIUM_1 = 8
+    CLASS = 9
+
+
+class ShadowPlane(IntEnum):
+    """Planes of the shadow ray of a path and of the radiance that it brings when nothing is in its way."""
+
+    ORIGIN_X = 0
+    ORIGIN_Y = 1
+    ORIGIN_Z = 2
+    DIRECTION_X = 3
+    DIRECTION_Y = 4
+    DIRECTION_Z = 5
+    DISTANCE = 6
+    RADIANCE_R = 7
+    RADIANCE_G = 8
+    RADIANCE_B = 9
+
+
+class PathClass(IntFlag):
+    """What a path waits for: kernels set the bits, `compact` sorts paths into lists by them."""
+
+    LIVE = 1
+    SHADOW = 2
+    SURFACE = 4
+    MEDIUM = 8
+
+
+class SlotFlag(IntFlag):
+    """What `reduce` does with the slots of a tile: see `film.py`."""
+
+    FIRST = 1
+    LAST = 2
+    REPLACE = 4
+
+
+class MaterialFlag(IntFlag):
+    """Properties of a material that choose a kernel or a branch."""
+
+    DOUBLE_SIDED = 1
+    TRANSMISSIVE = 2
+    EMISSIVE = 4
+
+
+def _packed(fields: list[tuple[str, type] | tuple[str, type, tuple[int, ...]]]) -> np.dtype:
+    return np.dtype(fields, align=False)
+
+
+NODE = _packed(
+    [
+        # One plane of the eight child boxes after the other: index 2 * axis + (1 for the upper bound),
+        # so that the sign of the ray direction chooses the near and the far plane by an offset.
+        ("bounds", np.float32, (6, BVH_WIDTH)),
+        # Another node of the same tree, NODE_LEAF | pack or object, or NODE_EMPTY.
+        ("child", np.uint32, (BVH_WIDTH,)),
+    ]
+)
+
+TRIANGLE_PACK = _packed(
+    [
+        # vertex[3 * corner + axis][lane], object space.
+        ("vertex", np.float32, (9, BVH_WIDTH)),
+        # Index of the face in its mesh, NO_INDEX for an unused lane (all its vertices are 0).
+        ("face", np.uint32, (BVH_WIDTH,)),
+    ]
+)
+
+OBJECT = _packed(
+    [
+        ("object_from_world", np.float32, (12,)),  # 3 x 4, row by row
+        ("world_from_object", np.float32, (12,)),
+        ("first_node", np.uint32),  # of its mesh in the buffer of all nodes
+        ("first_pack", np.uint32),
+        ("first_normal", np.uint32),  # float index of the mesh's corner normals, or NO_INDEX: flat faces
+        ("material", np.uint32),
+        ("mirrored", np.uint32),  # 1 where world_from_object turns the winding round
+        ("visible", np.uint32),
+        ("unused_0", np.uint32),
+        ("unused_1", np.uint32),
+    ]
+)
+
+MATERIAL = _packed(
+    [
+        ("base_color", np.float32, (3,)),
+        ("metallic", np.float32),
+        ("emission", np.float32, (3,)),
+        ("roughness", np.float32),
+        ("absorption", np.float32, (3,)),
+        ("specular", np.float32),
+        ("ior", np.float32),
+        ("transmission", np.float32),
+        ("light_pdf", np.float32),  # area density with which light sampling finds a point of this emitter
+        ("priority", np.uint32),
+        ("flags", np.uint32),
+        ("unused_0", np.uint32),
+        ("unused_1", np.uint32),
+        ("unused_2", np.uint32),
+    ]
+)
+
+LIGHT = _packed(
+    [
+        ("vertex", np.float32, (3,)),  # world space
+        ("edge_1", np.float32, (3,)),
+        ("edge_2", np.float32, (3,)),
+        ("emission", np.float32, (3,)),
+        ("pdf_area", np.float32),  # of choosing this triangle, and a point on it, per square metre
+        ("alias_probability", np.float32),  # Walker/Vose alias table over the triangles
+        ("alias", np.uint32),
+        ("double_sided", np.uint32),
+    ]
+)
+
+SLOT = _packed(
+    [
+        # The slots that hold copies of one tile stand next to each other and form a group; paths of
+        # a group go pixel by pixel with the copies innermost, because equal pixels make coherent rays.
+        ("tile_x", np.uint32),  # first pixel of the tile
+        ("tile_y", np.uint32),
+        ("first_sample", np.uint32),  # sample index of the first slot of the group
+        ("group_first", np.uint32),  # its first slot
+        ("group_count", np.uint32),
+        ("flags", np.uint32),  # SlotFlag
+    ]
+)
+
+CAMERA = _packed(
+    [
+        ("position", np.float32, (3,)),
+        ("right", np.float32, (3,)),  # scaled so that pixel (x, y) looks along
+        ("up", np.float32, (3,)),  # forward + (2 x / width - 1) right - (2 y / height - 1) up
+        ("forward", np.float32, (3,)),
+    ]
+)
+
+PARAMS = _packed(
+    [
+        ("camera", CAMERA),
+        ("width", np.uint32),
+        ("height", np.uint32),
+        ("tile_size", np.uint32),
+        ("slot_count", np.uint32),
+        ("first_path", np.uint32),  # of this chunk in the path buffer
+        ("path_count", np.uint32),  # in this chunk
+        ("path_stride", np.uint32),  # of the planes of path state
+        ("buffer_stride", np.uint32),  # of the planes of the path buffer
+        ("seed", np.uint32),
+        ("max_bounces", np.uint32),
+        ("transmission_bounces", np.uint32),
+        ("roulette_depth", np.uint32),
+        ("light_count", np.uint32),
+        ("environment_probability", np.float32),  # of sampling the environment instead of a triangle
+        ("environment_color", np.float32, (3,)),  # radiance; times the image
+        ("environment_width", np.uint32),
+        ("environment_height", np.uint32),
+        ("environment_rotation", np.float32),  # as a fraction of a full turn
+        ("object_count", np.uint32),
+        ("pixel_center", np.uint32),  # 1: camera rays go through pixel centres (picking, AOVs)
+    ]
+)
+
+STRUCTS: dict[str, np.dtype] = {
+    "Node": NODE,
+    "TrianglePack": TRIANGLE_PACK,
+    "Object": OBJECT,
+    "Material": MATERIAL,
+    "Light": LIGHT,
+    "Slot": SLOT,
+    "Camera": CAMERA,
+    "Params": PARAMS,
+}
+
+_C_TYPES = {np.dtype(np.float32): "float", np.dtype(np.int32): "int", np.dtype(np.uint32): "uint"}
+
+
+def _c_field(name: str, dtype: np.dtype) -> str:
+    base, shape = dtype.subdtype if dtype.subdtype is not None else (dtype, ())
+    for struct_name, struct in STRUCTS.items():
+        if base == struct:
+            c_type = struct_name
+            break
+    else:
+        c_type = _C_TYPES[base]
+    return f"    {c_type} {name}{''.join(f'[{n}]' for n in shape)};"
+
+
+def _c_struct(name: str, dtype: np.dtype) -> str:
+    assert dtype.names is not None and dtype.fields is not None
+    lines = [_c_field(field, dtype.fields[field][0]) for field in dtype.names]
+    body = "\n".join(lines)
+    # A negative array size stops the build where the device compiler lays the struct out otherwise.
+    check = f"typedef char assert_size_of_{name}[sizeof({name}) == {dtype.itemsize} ? 1 : -1];"
+    return f"typedef struct {{\n{body}\n}} {name};\n{check}"
+
+
+def _c_constant(name: str, value: int) -> str:
+    return f"#define {name} {value}u"
+
+
+def _c_enum(enum: type[IntEnum] | type[IntFlag], prefix: str) -> list[str]:
+    return [_c_constant(f"{prefix}_{member.name}", int(member)) for member in enum]
+
+
+def c_header() -> str:
+    """OpenCL C text of every constant, plane index and struct in this module."""
+    lines = [
+        _c_constant(name, value)
+        for name, value in sorted(globals().items())
+        if name.isupper() and not name.startswith("_") and isinstance(value, int)
+    ]
+    for enum, prefix in (
+        (RayPlane, "RAY"),
+        (HitPlane, "HIT"),
+        (PathPlane, "PATH"),
+        (ShadowPlane, "SHADOW"),
+        (PathClass, "CLASS"),
+        (SlotFlag, "SLOT"),
+        (MaterialFlag, "MATERIAL"),
+    ):
+        lines += _c_enum(enum, prefix)
+        if issubclass(enum, IntEnum):
+            lines.append(_c_constant(f"{prefix}_PLANES", len(enum)))
+    lines += [_c_struct(name, dtype) for name, dtype in STRUCTS.items()]
+    return "\n".join(lines) + "\n"

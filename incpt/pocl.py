@@ -1,0 +1,81 @@
+"""Makes the embedded PoCL device work on processors that are younger than it.
+
+PoCL 3.0 asks its LLVM 14 for the processor's name and hands it to clang as the target. LLVM answers
+"generic" for a processor that it does not know (AMD family 26, for one), and clang refuses just that
+name: "unknown target CPU 'generic'", so no kernel builds (PoCL issue 1049; later versions have
+POCL_LLVM_CPU_NAME, this one has no setting). The x86-64 micro-architecture levels are names that
+clang 14 knows and that any processor can be sorted into by its feature flags, so this module puts the
+right level into the one place of PoCL's device structure that holds the name.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from pathlib import Path
+from typing import Any
+
+_UNKNOWN = b"generic\0"
+_DEVICE_STRUCT_BYTES = 4096
+_POINTER_BYTES = ctypes.sizeof(ctypes.c_void_p)
+
+# System V ABI, x86-64 micro-architecture levels, in the words of /proc/cpuinfo.
+_LEVELS = (
+    ("x86-64-v4", {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}),
+    ("x86-64-v3", {"avx2", "bmi1", "bmi2", "f16c", "fma", "movbe"}),
+    ("x86-64-v2", {"cx16", "popcnt", "sse4_1", "sse4_2", "ssse3"}),
+)
+
+_names_in_use: list[Any] = []  # PoCL keeps pointers into these for the life of the process
+
+
+def name_target(cl_device: Any) -> str | None:
+    """Give PoCL a target that its clang knows, where it has none; return that name, else None.
+
+    Does nothing where the processor is known, or where the structure does not look as expected.
+    """
+    if "pocl" not in cl_device.platform.version.lower() or not Path("/proc/self/mem").exists():
+        return None
+    places = _pointers_to_unknown(cl_device.int_ptr)
+    if len(places) != 1:
+        return None
+    name = target_name(_cpu_flags())
+    text = ctypes.create_string_buffer(name.encode())
+    _names_in_use.append(text)
+    ctypes.c_void_p.from_address(places[0]).value = ctypes.addressof(text)
+    return name
+
+
+def target_name(flags: set[str]) -> str:
+    """The highest x86-64 level whose features, and those of the levels below, are all in `flags`."""
+    for i, (name, _) in enumerate(_LEVELS):
+        if all(needed <= flags for _, needed in _LEVELS[i:]):
+            return name
+    return "x86-64"
+
+
+def _cpu_flags() -> set[str]:
+    for line in Path("/proc/cpuinfo").read_text().splitlines():
+        if line.startswith("flags"):
+            return set(line.partition(":")[2].split())
+    return set()
+
+
+def _pointers_to_unknown(address: int) -> list[int]:
+    # Read by way of /proc/self/mem, which answers a wild pointer with an error instead of a crash.
+    found = []
+    with open("/proc/self/mem", "rb", buffering=0) as memory:
+
+        def read(start: int, size: int) -> bytes:
+            try:
+                memory.seek(start)
+                return memory.read(size)
+            except (OSError, ValueError, OverflowError):
+                return b""
+
+        for place in range(address, address + _DEVICE_STRUCT_BYTES, _POINTER_BYTES):
+            word = read(place, _POINTER_BYTES)
+            if len(word) < _POINTER_BYTES:
+                break
+            if read(int.from_bytes(word, "little"), len(_UNKNOWN)) == _UNKNOWN:
+                found.append(place)
+    return found
