@@ -1,0 +1,40 @@
+"""The three modes of the thesis (section 3.4) and the one transition between them.
+
+BASE         the first coarse picture, from nothing: base queue, what was accumulated is thrown away.
+REFINE       the base queue again and again, accumulated.
+INCREMENTAL  after a local edit: the spiral queue with a high NoR; each finished tile replaces what was
+             accumulated for it, all others keep theirs.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class Mode(Enum):
+    """How a session renders at the moment."""
+
+    BASE = "base"
+    REFINE = "refine"
+    INCREMENTAL = "incremental"
+
+
+class Event(Enum):
+    """What may change the mode: an edit of either kind, or the end of the tile queue."""
+
+    GLOBAL_CHANGE = "global change"
+    LOCAL_CHANGE = "local change"
+    QUEUE_DONE = "queue done"
+
+
+def next_mode(mode: Mode, event: Event, strategy: str) -> Mode:
+    """The mode after `event`; every answer starts a new queue, also where the mode stays the same.
+
+    `strategy` is one of `settings.STRATEGIES`. A local change during BASE starts over, because there is
+    no whole picture yet that could be kept; under "restart" every change does.
+    """
+    if event is Event.QUEUE_DONE:
+        return Mode.REFINE
+    if event is Event.GLOBAL_CHANGE or strategy == "restart" or mode is Mode.BASE:
+        return Mode.BASE
+    return Mode.INCREMENTAL
