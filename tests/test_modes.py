@@ -25,7 +25,7 @@ SPIRAL = {
 }
 
 
-@pytest.mark.parametrize(("mode", "event"), product(Mode, Event))
+@pytest.mark.parametrize(("mode", "event"), list(product(Mode, Event)))
 def test_spiral_transitions(mode: Mode, event: Event) -> None:
     assert next_mode(mode, event, "spiral") is SPIRAL[mode, event]
 
