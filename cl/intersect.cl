@@ -1,0 +1,138 @@
+// Finds the nearest hit of each path's ray and describes the surface there.
+
+#include "bvh.cl"
+
+// Rounding errors of position and of the next ray's test, in units of float32's half ulp: see offset_bound.
+#define POSITION_ULPS 16.0f
+#define TEST_ULPS 16.0f
+#define HALF_ULP 5.9604645e-8f
+
+static void scale_to_unit(float *v) {
+    float largest = bvh_abs(v[0]);
+    largest = bvh_abs(v[1]) > largest ? bvh_abs(v[1]) : largest;
+    largest = bvh_abs(v[2]) > largest ? bvh_abs(v[2]) : largest;
+    // In two steps, because squares of very small or large components would leave the range of a float.
+    const float x = v[0] / largest, y = v[1] / largest, z = v[2] / largest;
+    const float scale = 1.0f / sqrt(x * x + y * y + z * z);
+    v[0] = x * scale;
+    v[1] = y * scale;
+    v[2] = z * scale;
+}
+
+static float dot3(const float *a, const float *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+// A normal of object space in world space: by the inverse transpose, which keeps the outside outside, also
+// where the object is mirrored.
+static void world_normal(__global const Object *object, const float *normal, float *result) {
+    __global const float *m = object->object_from_world;
+    for (uint i = 0; i < 3; i++)
+        result[i] = m[i] * normal[0] + m[4 + i] * normal[1] + m[8 + i] * normal[2];
+    scale_to_unit(result);
+}
+
+// How far along the unit normal a ray must start to be clear of the surface. Bounds, axis by axis as in
+// pbrt-v4 section 6.8, the rounding of the hit position (interpolation, transform to world space) and of the
+// next ray's origin (transform to object space); and, by the triangle's extent, the error of the test itself.
+static float offset_bound(__global const Object *object, const float (*vertex)[3], const float *normal) {
+    __global const float *w = object->world_from_object, *m = object->object_from_world;
+    float largest[3], extent[3], world[3], back[3], bound = 0.0f, test = 0.0f;
+    for (uint i = 0; i < 3; i++) {
+        const float a = vertex[0][i], b = vertex[1][i], c = vertex[2][i];
+        const float low = a < b ? (a < c ? a : c) : (b < c ? b : c);
+        const float high = a > b ? (a > c ? a : c) : (b > c ? b : c);
+        largest[i] = -low > high ? -low : high;
+        extent[i] = high - low;
+    }
+    for (uint i = 0; i < 3; i++)
+        world[i] = bvh_abs(w[4 * i]) * largest[0] + bvh_abs(w[4 * i + 1]) * largest[1] +
+                   bvh_abs(w[4 * i + 2]) * largest[2] + bvh_abs(w[4 * i + 3]);
+    for (uint i = 0; i < 3; i++)
+        back[i] = bvh_abs(m[4 * i]) * world[0] + bvh_abs(m[4 * i + 1]) * world[1] +
+                  bvh_abs(m[4 * i + 2]) * world[2] + bvh_abs(m[4 * i + 3]);
+    for (uint i = 0; i < 3; i++) {
+        const float x = bvh_abs(w[4 * i]), y = bvh_abs(w[4 * i + 1]), z = bvh_abs(w[4 * i + 2]);
+        bound += bvh_abs(normal[i]) * (world[i] + x * back[0] + y * back[1] + z * back[2]);
+        const float size = x * extent[0] + y * extent[1] + z * extent[2];
+        test = size > test ? size : test;
+    }
+    return HALF_ULP * (POSITION_ULPS * bound + TEST_ULPS * test);
+}
+
+static void shading_normal(__global const Object *object, __global const float *normals, uint face,
+                           const float *weight, const float *geometric, float *result) {
+    float interpolated[3] = {0.0f, 0.0f, 0.0f}, largest = 0.0f;
+    if (object->first_normal != NO_INDEX) {
+        __global const float *corner = normals + object->first_normal + 9 * (size_t)face;
+        for (uint i = 0; i < 3; i++) {
+            interpolated[i] = weight[0] * corner[i] + weight[1] * corner[3 + i] + weight[2] * corner[6 + i];
+            largest += bvh_abs(interpolated[i]);
+        }
+    }
+    if (largest < 1e-6f) { // flat, or normals that cancel out
+        for (uint i = 0; i < 3; i++)
+            result[i] = geometric[i];
+        return;
+    }
+    world_normal(object, interpolated, result);
+    if (dot3(result, geometric) < 0.0f)
+        for (uint i = 0; i < 3; i++)
+            result[i] = -result[i];
+}
+
+__kernel void intersect(const Params params, const uint count, __global const uint *list,
+                        __global const Node *top_nodes, __global const Node *nodes,
+                        __global const TrianglePack *packs, __global const Object *objects,
+                        __global const Material *materials, __global const float *normals,
+                        __global const float *rays, __global float *paths, __global float *hits) {
+    if (get_global_id(0) >= count)
+        return;
+    const uint k = list[get_global_id(0)], stride = params.path_stride;
+    float origin[3], direction[3];
+    for (uint i = 0; i < 3; i++) {
+        origin[i] = rays[(RAY_ORIGIN_X + i) * stride + k];
+        direction[i] = rays[(RAY_DIRECTION_X + i) * stride + k];
+    }
+    BvhHit hit;
+    hit.distance = INFINITY;
+    bvh_trace(origin, direction, top_nodes, nodes, packs, objects, false, &hit);
+    hits[HIT_DISTANCE * stride + k] = hit.distance;
+    hits[HIT_OBJECT * stride + k] = as_float(hit.object);
+    if (hit.object == NO_INDEX) {
+        paths[PATH_CLASS * stride + k] = as_float((uint)(CLASS_LIVE | CLASS_SURFACE));
+        return;
+    }
+
+    __global const Object *object = objects + hit.object;
+    __global const TrianglePack *pack = packs + object->first_pack + hit.pack;
+    const BvhRay ray = bvh_object_ray(object, origin, direction);
+    float weight[3], depth;
+    bvh_edges1(&ray, pack, hit.lane, &weight[0], &weight[1], &weight[2], &depth);
+    const float scale = 1.0f / (weight[0] + weight[1] + weight[2]);
+    float vertex[3][3], point[3], position[3];
+    for (uint i = 0; i < 3; i++) {
+        weight[i] *= scale;
+        for (uint axis = 0; axis < 3; axis++)
+            vertex[i][axis] = pack->vertex[3 * i + axis][hit.lane];
+    }
+    for (uint i = 0; i < 3; i++)
+        point[i] = weight[0] * vertex[0][i] + weight[1] * vertex[1][i] + weight[2] * vertex[2][i];
+    bvh_transform_point(object->world_from_object, point, position);
+    float normal[3], geometric[3], shading[3];
+    bvh_normal(vertex, normal);
+    world_normal(object, normal, geometric);
+    const uint face = pack->face[hit.lane];
+    shading_normal(object, normals, face, weight, geometric, shading);
+
+    for (uint i = 0; i < 3; i++) {
+        hits[(HIT_POSITION_X + i) * stride + k] = position[i];
+        hits[(HIT_GEOMETRIC_X + i) * stride + k] = geometric[i];
+        hits[(HIT_SHADING_X + i) * stride + k] = shading[i];
+    }
+    hits[HIT_OFFSET * stride + k] = offset_bound(object, vertex, geometric);
+    hits[HIT_MATERIAL * stride + k] = as_float(object->material);
+    hits[HIT_TRIANGLE * stride + k] = as_float(face);
+    const bool in_medium = as_uint(paths[PATH_MEDIUM_0 * stride + k]) != NO_INDEX;
+    const bool transmissive = materials[object->material].flags & MATERIAL_TRANSMISSIVE;
+    const uint kind = in_medium || transmissive ? CLASS_MEDIUM : CLASS_SURFACE;
+    paths[PATH_CLASS * stride + k] = as_float(CLASS_LIVE | kind);
+}

@@ -1,0 +1,35 @@
+// Traces shadow rays, and adds to the path buffer the radiance of those that nothing is in the way of.
+
+#include "bvh.cl"
+
+// Transmittance of an absorbing body (Beer-Lambert).
+static float transmittance(float absorption, float distance) {
+    return absorption > 0.0f ? exp(-absorption * distance) : 1.0f;
+}
+
+__kernel void occlude(const Params params, const uint count, __global const uint *list,
+                      __global const Node *top_nodes, __global const Node *nodes,
+                      __global const TrianglePack *packs, __global const Object *objects,
+                      __global const Material *materials, __global const float *shadows,
+                      __global const float *paths, __global float *radiance) {
+    if (get_global_id(0) >= count)
+        return;
+    const uint k = list[get_global_id(0)], stride = params.path_stride;
+    float origin[3], direction[3];
+    for (uint i = 0; i < 3; i++) {
+        origin[i] = shadows[(SHADOW_ORIGIN_X + i) * stride + k];
+        direction[i] = shadows[(SHADOW_DIRECTION_X + i) * stride + k];
+    }
+    const float distance = shadows[SHADOW_DISTANCE * stride + k];
+    BvhHit hit;
+    hit.distance = distance;
+    if (bvh_trace(origin, direction, top_nodes, nodes, packs, objects, true, &hit))
+        return;
+    const uint medium = as_uint(paths[PATH_MEDIUM_0 * stride + k]) & MEDIUM_NONE;
+    for (uint c = 0; c < 3; c++) {
+        float value = shadows[(SHADOW_RADIANCE_R + c) * stride + k];
+        if (medium != MEDIUM_NONE)
+            value *= transmittance(materials[medium].absorption[c], distance);
+        radiance[c * params.buffer_stride + params.first_path + k] += value;
+    }
+}
