@@ -18,6 +18,9 @@ import numpy as np
 BVH_WIDTH = 8
 """Children per node and triangles per pack: one float8 register."""
 
+BVH_MAX_DEPTH = 16
+"""Levels of a tree at most: the builder keeps to it, traversal sizes its stack by it."""
+
 NODE_EMPTY = 0xFFFFFFFF
 """Child reference of an unused place in a node (its box is inverted, so that no ray enters it)."""
 NODE_LEAF = 0x80000000

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 _UNKNOWN = b"generic\0"
-_DEVICE_STRUCT_BYTES = 4096
+# The name stands about 640 bytes from the start; further on, stale copies of the pointer may lie about.
+_DEVICE_STRUCT_BYTES = 1024
 _POINTER_BYTES = ctypes.sizeof(ctypes.c_void_p)
 
 # System V ABI, x86-64 micro-architecture levels, in the words of /proc/cpuinfo.
