@@ -56,7 +56,7 @@ class Device:
             self.queue = cl.CommandQueue(self.context)
         except cl.Error as error:
             raise DeviceError(f"device {self.name!r} cannot be opened: {error}; try another --device") from error
-        self._kernels: dict[str, cl.Kernel] = {}
+        self._kernels: dict[tuple[str, tuple[str, ...]], cl.Kernel] = {}
 
     @property
     def name(self) -> str:
@@ -74,17 +74,18 @@ class Device:
     def tuning(self) -> Tuning:
         return _CPU if self.is_cpu else _GPU
 
-    def kernel(self, name: str, file: str | None = None) -> cl.Kernel:
+    def kernel(self, name: str, file: str | None = None, features: tuple[str, ...] = ()) -> cl.Kernel:
         """The kernel `name` of cl/`file`.cl (of cl/`name`.cl by default), built at its first use.
 
-        Raises DeviceError with the compiler's first error where it does not build.
+        `features` are preprocessor names that choose a variant of it. Raises DeviceError with the
+        compiler's first error where it does not build.
         """
-        if name not in self._kernels:
-            program = self._build(file or name)
+        if (name, features) not in self._kernels:
+            program = self._build(file or name, features)
             # cl.Kernel(program, name), fetched once: attribute access makes a new one each time.
             for kernel_name in program.kernel_names.split(";"):
-                self._kernels[kernel_name] = cl.Kernel(program, kernel_name)
-        return self._kernels[name]
+                self._kernels[kernel_name, features] = cl.Kernel(program, kernel_name)
+        return self._kernels[name, features]
 
     def launch(self, kernel: cl.Kernel, size: int, *args: Any, work_group: int | None = None) -> None:
         """Enqueue `size` work-items, rounded up to whole groups; args are buffers and numpy scalars."""
@@ -141,9 +142,11 @@ class Device:
         except cl.Error as error:
             raise DeviceError(_explain(error, "the device")) from error
 
-    def _build(self, file: str) -> cl.Program:
+    def _build(self, file: str, features: tuple[str, ...]) -> cl.Program:
         # The target is part of the source, so that a kernel cached for another processor is not taken.
-        text = f"// target: {self.target}\n#line 1 \"layout.py\"\n{layout.c_header()}\n{source(file)}"
+        names = [*features, *(["INCPT_POCL"] if self.is_pocl else [])]
+        defines = "".join(f"#define {name}\n" for name in names)
+        text = f"// target: {self.target}\n{defines}{layout.c_header()}\n{source(file)}"
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", cl.CompilerWarning)

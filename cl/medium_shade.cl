@@ -1,0 +1,146 @@
+#include "dielectric.cl"
+
+// What happens where a ray ends on a transparent body, or inside one: absorption on the way, then the
+// boundary of nested dielectrics. A path that turns out to stand on an opaque surface is passed on to
+// `shade` by its class. Rarer and full of branches, so it stands apart from `shade` and is not vectorised.
+__kernel void medium_shade(const Params params, const uint count, __global const uint *list,
+                           __global const Material *materials, __global const Light *lights,
+                           __global const float *environment_image,
+                           __global const float *environment_marginal,
+                           __global const float *environment_conditional,
+                           __global const float *environment_pdf, __global const float *hits,
+                           __global float *rays, __global float *paths, __global float *shadows,
+                           __global float *radiance) {
+    uint stride = params.path_stride;
+    uint item = (uint)get_global_id(0);
+    if (item >= count)
+        return;
+    uint path = list[item];
+    uint result = params.first_path + path;
+    __global uint *bits = (__global uint *)paths;
+    Emitters emitters;
+    emitters.lights = lights;
+    emitters.image = environment_image;
+    emitters.marginal = environment_marginal;
+    emitters.conditional = environment_conditional;
+    emitters.texel_pdf = environment_pdf;
+
+    uint hit_material = ((__global const uint *)hits)[HIT_MATERIAL * stride + path];
+    __global const Material *material = &materials[hit_material];
+    Vec3 direction = load3(rays + RAY_DIRECTION_X * stride, stride, path);
+    Vec3 position = load3(hits + HIT_POSITION_X * stride, stride, path);
+    Vec3 geometric = load3(hits + HIT_GEOMETRIC_X * stride, stride, path);
+    Vec3 shading = load3(hits + HIT_SHADING_X * stride, stride, path);
+    float distance = hits[HIT_DISTANCE * stride + path];
+    float offset = hits[HIT_OFFSET * stride + path];
+    Vec3 throughput = load3(paths + PATH_THROUGHPUT_R * stride, stride, path);
+    float bsdf_pdf = paths[PATH_BSDF_PDF * stride + path];
+    uint counts = bits[PATH_COUNTS * stride + path];
+    uint bounces = counts & 0xffu, passages = (counts >> 8) & 0xffu, ray = (counts >> 16) & 0xffu;
+    uint seed = pixel_seed(bits[PATH_PIXEL * stride + path], params.seed);
+    uint sample = bits[PATH_SAMPLE * stride + path];
+
+    // Absorption on the way here (Beer and Lambert).
+    MediumStack before = load_medium_stack(bits, stride, path);
+    if (before.entry[0] != MEDIUM_NONE) {
+        Vec3 absorption = material_vec3(materials[before.entry[0]].absorption);
+        throughput = times(throughput, vec3(exp(-absorption.x * distance), exp(-absorption.y * distance),
+                                            exp(-absorption.z * distance)));
+        store3(paths + PATH_THROUGHPUT_R * stride, stride, path, throughput);
+    }
+
+    // Opaque, or taken for opaque by chance where the material is partly transmissive.
+    Uniform2 luck = uniform_2d(seed, sample, PAIR_LUCK(ray));
+    if (luck.v >= material->transmission) {
+        bits[PATH_CLASS * stride + path] = CLASS_SURFACE;
+        return;
+    }
+    float facing = -inner(geometric, direction);
+    Vec3 gathered = load3(radiance, params.buffer_stride, result);
+    Vec3 emitted = emitted_radiance(material, facing, distance, bsdf_pdf);
+    store3(radiance, params.buffer_stride, result, add(gathered, times(throughput, emitted)));
+
+    // The media on both sides. A ray that leaves a body which it never entered started inside of it.
+    MediumStack after = before;
+    uint near = before.entry[0];
+    if (facing > 0.0f)
+        enter_medium(&after, materials, hit_material);
+    else if (!leave_medium(&after, hit_material))
+        near = hit_material;
+    uint far = after.entry[0];
+    int covered = near == far; // a body of higher priority hides this boundary
+    int outside = facing > 0.0f;
+
+    float side = facing > 0.0f ? 1.0f : -1.0f;
+    geometric = scaled(side, geometric);
+    shading = scaled(side, shading);
+    if (inner(shading, direction) > -1e-4f)
+        shading = geometric;
+    Frame frame = frame_of(shading);
+    Vec3 wo = to_local(frame, scaled(-1.0f, direction));
+    wo.z = max(wo.z, 1e-4f);
+    Boundary boundary;
+    boundary.eta = medium_ior(materials, far) / medium_ior(materials, near);
+    boundary.alpha = max(material->roughness * material->roughness, MIN_ALPHA);
+    boundary.specular = material->specular;
+    boundary.transmitted = material_vec3(material->base_color);
+    // Without a step in IOR there is nothing to scatter at, however rough.
+    int smooth = material->roughness * material->roughness <= MIN_ALPHA || fabs(boundary.eta - 1.0f) < 1e-5f;
+    Uniform2 choices = uniform_2d(seed, sample, PAIR_CHOICE(ray));
+    uint path_class = 0u;
+
+    // Light sampling, where a rough boundary has a density for it.
+#if defined(ENVIRONMENT_IMAGE) || defined(TRIANGLE_LIGHTS)
+    if (!covered && !smooth && bounces <= params.max_bounces) {
+        LightSample light =
+            sample_light(&params, &emitters, position, uniform_2d(seed, sample, PAIR_LIGHT(ray)), choices.v);
+        Vec3 wi = to_local(frame, light.direction);
+        BsdfValue value = eval_rough_boundary(&boundary, wo, wi);
+        float above = inner(geometric, light.direction);
+        if (light.pdf > 0.0f && value.pdf > 0.0f && above * wi.z > 0.0f) {
+            float weight = mis_weight(light.pdf, value.pdf) / light.pdf;
+            Vec3 arriving = times(times(throughput, value.f_cos), scaled(weight, light.radiance));
+            store3(shadows + SHADOW_ORIGIN_X * stride, stride, path,
+                   along(position, above > 0.0f ? offset : -offset, geometric));
+            store3(shadows + SHADOW_DIRECTION_X * stride, stride, path, light.direction);
+            shadows[SHADOW_DISTANCE * stride + path] = light.distance * 0.9999f - offset;
+            store3(shadows + SHADOW_RADIANCE_R * stride, stride, path, arriving);
+            path_class |= CLASS_SHADOW;
+        }
+    }
+#endif
+
+    BsdfSample next;
+    if (covered) {
+        next.wi = scaled(-1.0f, wo);
+        next.weight = vec3(1.0f, 1.0f, 1.0f);
+        next.pdf = 0.0f;
+    } else if (smooth) {
+        next = sample_smooth_boundary(&boundary, wo, choices.u);
+    } else {
+        next = sample_rough_boundary(&boundary, wo, uniform_2d(seed, sample, PAIR_DIRECTION(ray)), choices.u);
+    }
+    int reflected = next.wi.z > 0.0f;
+    Vec3 next_direction = covered ? direction : unit(from_local(frame, next.wi));
+    float leaving = inner(geometric, next_direction);
+    int possible = (covered || smooth || next.pdf > 0.0f) && (reflected ? leaving > 0.0f : leaving < 0.0f);
+
+    // Passages and inner reflections of smooth bodies have a budget of their own; a covered boundary is none.
+    int passage = smooth && !(reflected && outside);
+    bounces += !covered && !passage;
+    passages += !covered && passage;
+    throughput = times(throughput, next.weight);
+    float survival = survival_probability(throughput, bounces, params.roulette_depth);
+    int goes_on = possible && bounces <= params.max_bounces + 1u && passages <= params.transmission_bounces &&
+                  ray < 250u && largest(throughput) > 0.0f && luck.u < survival;
+
+    if (!reflected)
+        store_medium_stack(bits, stride, path, &after);
+    store3(rays + RAY_ORIGIN_X * stride, stride, path,
+           along(position, reflected ? offset : -offset, geometric));
+    store3(rays + RAY_DIRECTION_X * stride, stride, path, next_direction);
+    store3(paths + PATH_THROUGHPUT_R * stride, stride, path, scaled(1.0f / survival, throughput));
+    paths[PATH_BSDF_PDF * stride + path] = next.pdf;
+    bits[PATH_COUNTS * stride + path] = bounces | (passages << 8) | ((ray + 1u) << 16);
+    bits[PATH_CLASS * stride + path] = path_class | (goes_on ? CLASS_LIVE : 0u);
+}

@@ -1,0 +1,105 @@
+// Scalar mathematics and three-vectors from which PoCL can still make SIMD lanes out of work-items.
+//
+// PoCL does not inline OpenCL's built-in functions into a kernel, and one call left in a kernel keeps its
+// loop over work-items from being vectorised; so there compiler intrinsics and selects stand in for them.
+// Elsewhere the names mean the built-ins. Vec3 is a struct of scalars for the same reason: values of type
+// float3 are not vectorised over.
+
+#ifdef INCPT_POCL
+#define SQRT(x) __builtin_sqrtf(x)
+#define FABS(x) __builtin_fabsf(x)
+#define FLOOR(x) __builtin_floorf(x)
+#define REVERSE_BITS(x) __builtin_bitreverse32(x)
+#else
+#define SQRT(x) sqrt(x)
+#define FABS(x) fabs(x)
+#define FLOOR(x) floor(x)
+#define REVERSE_BITS(x) reverse_bits(x)
+#endif
+
+#define PI 3.14159265358979f
+#define INV_PI 0.318309886183791f
+
+// Ternaries, not the built-ins: they become selects. A NaN in `a` gives `b`.
+#define MIN(a, b) ((a) < (b) ? (a) : (b))
+#define MAX(a, b) ((a) > (b) ? (a) : (b))
+#define CLAMP(x, low, high) MIN(MAX(x, low), high)
+#define LERP(a, b, t) ((a) + ((b) - (a)) * (t))
+
+typedef struct {
+    float x, y, z;
+} Vec3;
+
+static inline Vec3 vec3(float x, float y, float z) {
+    Vec3 v;
+    v.x = x;
+    v.y = y;
+    v.z = z;
+    return v;
+}
+
+static inline Vec3 add(Vec3 a, Vec3 b) { return vec3(a.x + b.x, a.y + b.y, a.z + b.z); }
+static inline Vec3 subtract(Vec3 a, Vec3 b) { return vec3(a.x - b.x, a.y - b.y, a.z - b.z); }
+static inline Vec3 times(Vec3 a, Vec3 b) { return vec3(a.x * b.x, a.y * b.y, a.z * b.z); }
+static inline Vec3 scaled(float s, Vec3 a) { return vec3(s * a.x, s * a.y, s * a.z); }
+static inline Vec3 along(Vec3 origin, float t, Vec3 direction) { return add(origin, scaled(t, direction)); }
+static inline Vec3 choose(int condition, Vec3 a, Vec3 b) {
+    return vec3(condition ? a.x : b.x, condition ? a.y : b.y, condition ? a.z : b.z);
+}
+static inline float inner(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+static inline Vec3 outer(Vec3 a, Vec3 b) {
+    return vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+}
+static inline Vec3 unit(Vec3 a) { return scaled(1.0f / SQRT(inner(a, a)), a); }
+static inline float largest(Vec3 a) { return MAX(MAX(a.x, a.y), a.z); }
+static inline float luminance(Vec3 c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
+
+static inline Vec3 load3(__global const float *plane, uint stride, uint i) {
+    return vec3(plane[i], plane[stride + i], plane[2 * stride + i]);
+}
+static inline void store3(__global float *plane, uint stride, uint i, Vec3 v) {
+    plane[i] = v.x;
+    plane[stride + i] = v.y;
+    plane[2 * stride + i] = v.z;
+}
+
+static inline uint reverse_bits(uint x) {
+    x = (x << 16) | (x >> 16);
+    x = ((x & 0x00ff00ffu) << 8) | ((x & 0xff00ff00u) >> 8);
+    x = ((x & 0x0f0f0f0fu) << 4) | ((x & 0xf0f0f0f0u) >> 4);
+    x = ((x & 0x33333333u) << 2) | ((x & 0xccccccccu) >> 2);
+    return ((x & 0x55555555u) << 1) | ((x & 0xaaaaaaaau) >> 1);
+}
+
+// Sine and cosine of an angle in turns, 0 <= turns <= 1; absolute error below 2e-7. The angle is reduced
+// to an eighth of a turn on either side of a quarter; the Taylor series is exact to float there.
+static inline void sincos_turns(float turns, float *sine, float *cosine) {
+    float quarter = FLOOR(4.0f * turns + 0.5f);
+    float x = (turns - 0.25f * quarter) * (2.0f * PI);
+    float x2 = x * x;
+    float s = x * (1.0f + x2 * (-1.6666667e-1f + x2 * (8.3333333e-3f + x2 * -1.9841270e-4f)));
+    float c = 1.0f + x2 * (-0.5f + x2 * (4.1666667e-2f + x2 * (-1.3888889e-3f + x2 * 2.4801587e-5f)));
+    int q = (int)quarter & 3;
+    float s1 = q & 1 ? c : s;
+    float c1 = q & 1 ? s : c;
+    *sine = q & 2 ? -s1 : s1;
+    *cosine = (q + 1) & 2 ? -c1 : c1;
+}
+
+// atan2(y, x) in turns, in [-0.5, 0.5]; absolute error below 1e-6. 0 where both are 0.
+static inline float atan2_turns(float y, float x) {
+    float ax = FABS(x), ay = FABS(y);
+    float high = MAX(ax, ay), low = MIN(ax, ay);
+    float t = low / MAX(high, 1e-37f);
+    float t2 = t * t;
+    // Minimax polynomial of atan(t) / t on [0, 1] in t^2.
+    float p = 0.05265332f + t2 * -0.0117212f;
+    p = -0.11643287f + t2 * p;
+    p = 0.19354346f + t2 * p;
+    p = -0.33262347f + t2 * p;
+    p = 0.99997726f + t2 * p;
+    float angle = t * p * (0.5f * INV_PI);
+    angle = ay > ax ? 0.25f - angle : angle;
+    angle = x < 0.0f ? 0.5f - angle : angle;
+    return y < 0.0f ? -angle : angle;
+}

@@ -1,0 +1,111 @@
+#include "light.cl"
+
+// What happens where a ray ends on an opaque surface or leaves the scene: the path gathers what is emitted
+// there, asks for a shadow ray towards a light, and goes on in a direction that the material chooses.
+//
+//   L_o(wo) = L_e(wo) + integral of f(wo, wi) L_i(wi) cos(wi) d wi
+//
+// with the integral estimated by light sampling (the shadow ray) and by BSDF sampling (the next ray, whose
+// emission counts at its end), combined by multiple importance sampling. Straight-line code of scalars, so
+// that PoCL runs it in SIMD lanes.
+__kernel void shade(const Params params, const uint count, __global const uint *list,
+                    __global const Material *materials, __global const float *layers,
+                    __global const Light *lights, __global const float *environment_image,
+                    __global const float *environment_marginal,
+                    __global const float *environment_conditional,
+                    __global const float *environment_pdf, __global const float *hits, __global float *rays,
+                    __global float *paths, __global float *shadows, __global float *radiance) {
+    uint stride = params.path_stride;
+    uint item = (uint)get_global_id(0);
+    int listed = item < count;
+    uint path = listed ? list[item] : stride - 1u;
+    uint result = listed ? params.first_path + path : params.buffer_stride - 1u;
+    __global uint *bits = (__global uint *)paths;
+    Emitters emitters;
+    emitters.lights = lights;
+    emitters.image = environment_image;
+    emitters.marginal = environment_marginal;
+    emitters.conditional = environment_conditional;
+    emitters.texel_pdf = environment_pdf;
+
+    // Where the ray ended.
+    __global const uint *hit_bits = (__global const uint *)hits;
+    int missed = hit_bits[HIT_OBJECT * stride + path] == NO_INDEX;
+    uint material_index = missed ? 0u : hit_bits[HIT_MATERIAL * stride + path];
+    __global const Material *material = &materials[material_index];
+    Vec3 direction = load3(rays + RAY_DIRECTION_X * stride, stride, path);
+    Vec3 position = load3(hits + HIT_POSITION_X * stride, stride, path);
+    Vec3 geometric = load3(hits + HIT_GEOMETRIC_X * stride, stride, path);
+    Vec3 shading = load3(hits + HIT_SHADING_X * stride, stride, path);
+    float distance = hits[HIT_DISTANCE * stride + path];
+    float offset = hits[HIT_OFFSET * stride + path];
+    Vec3 throughput = load3(paths + PATH_THROUGHPUT_R * stride, stride, path);
+    float bsdf_pdf = paths[PATH_BSDF_PDF * stride + path];
+    uint counts = bits[PATH_COUNTS * stride + path];
+    uint bounces = counts & 0xffu;
+    uint ray = (counts >> 16) & 0xffu;
+
+    // Emission at the hit, or radiance from far away.
+    float facing = -inner(geometric, direction);
+    Vec3 emitted = emitted_radiance(material, facing, distance, bsdf_pdf);
+    float environment_light_pdf;
+    Vec3 far = eval_environment(&params, &emitters, direction, &environment_light_pdf);
+    float far_weight = bsdf_pdf > 0.0f ? mis_weight(MAX(bsdf_pdf, 1e-30f), environment_light_pdf) : 1.0f;
+    emitted = choose(missed, scaled(far_weight, far), emitted);
+    Vec3 gathered = load3(radiance, params.buffer_stride, result);
+    store3(radiance, params.buffer_stride, result, add(gathered, times(throughput, emitted)));
+
+    // The surface as seen along the ray: both normals on its side.
+    float side = facing > 0.0f ? 1.0f : -1.0f;
+    geometric = scaled(side, geometric);
+    shading = scaled(side, shading);
+    shading = choose(inner(shading, direction) < -1e-4f, shading, geometric);
+    Frame frame = frame_of(shading);
+    Vec3 wo = to_local(frame, scaled(-1.0f, direction));
+    wo.z = MAX(wo.z, 1e-4f);
+    Surface surface = surface_of(material, layers + material_index * (ALBEDO_TABLE_SIZE + 1u));
+    Vec3 origin = along(position, offset, geometric);
+    int scatters = !missed & (bounces <= params.max_bounces);
+
+    uint seed = pixel_seed(bits[PATH_PIXEL * stride + path], params.seed);
+    uint sample = bits[PATH_SAMPLE * stride + path];
+    Uniform2 choices = uniform_2d(seed, sample, PAIR_CHOICE(ray));
+    uint path_class = 0u;
+
+    // Light sampling: a shadow ray, if the light's side of the surface is the ray's side.
+#if defined(ENVIRONMENT_IMAGE) || defined(TRIANGLE_LIGHTS)
+    LightSample light =
+        sample_light(&params, &emitters, origin, uniform_2d(seed, sample, PAIR_LIGHT(ray)), choices.v);
+    BsdfValue towards_light = eval_surface(&surface, wo, to_local(frame, light.direction));
+    int lit = scatters & (light.pdf > 0.0f) & (towards_light.pdf > 0.0f) &
+              (inner(geometric, light.direction) > 0.0f);
+    float light_weight = lit ? mis_weight(lit ? light.pdf : 1.0f, towards_light.pdf) / (lit ? light.pdf : 1.0f) : 0.0f;
+    Vec3 arriving = times(times(throughput, towards_light.f_cos), scaled(light_weight, light.radiance));
+    lit = lit & (largest(arriving) > 0.0f);
+    store3(shadows + SHADOW_ORIGIN_X * stride, stride, path, origin);
+    store3(shadows + SHADOW_DIRECTION_X * stride, stride, path, light.direction);
+    // The light's own surface must not be in its way.
+    shadows[SHADOW_DISTANCE * stride + path] = light.distance * 0.9999f - offset;
+    store3(shadows + SHADOW_RADIANCE_R * stride, stride, path, arriving);
+    path_class = lit ? CLASS_SHADOW : 0u;
+#endif
+
+    // BSDF sampling: the next ray.
+    BsdfSample next = sample_surface(&surface, wo, uniform_2d(seed, sample, PAIR_DIRECTION(ray)), choices.u);
+    Vec3 next_direction = from_local(frame, next.wi);
+    throughput = times(throughput, next.weight);
+    int goes_on = scatters & (next.pdf > 0.0f) & (inner(geometric, next_direction) > 0.0f);
+
+    // Russian roulette: a path that carries little may end, one that survives stands for those that did not.
+    float survival = survival_probability(throughput, bounces, params.roulette_depth);
+    float luck = uniform_2d(seed, sample, PAIR_LUCK(ray)).u;
+    goes_on = goes_on & (luck < survival) & (largest(throughput) > 0.0f);
+    throughput = scaled(1.0f / survival, throughput);
+
+    store3(rays + RAY_ORIGIN_X * stride, stride, path, origin);
+    store3(rays + RAY_DIRECTION_X * stride, stride, path, unit(next_direction));
+    store3(paths + PATH_THROUGHPUT_R * stride, stride, path, throughput);
+    paths[PATH_BSDF_PDF * stride + path] = next.pdf;
+    bits[PATH_COUNTS * stride + path] = counts + 0x10001u;
+    bits[PATH_CLASS * stride + path] = path_class | (goes_on ? CLASS_LIVE : 0u);
+}

@@ -1,0 +1,196 @@
+"""The scene on the device, kept up to date with the least work.
+
+`_PARTS` is the one table that says which change rebuilds what. Moving an object rewrites the objects and
+the top level; a material edit rewrites the material table; a camera move rewrites nothing here, since the
+camera travels with the parameters of every launch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from incpt import albedo, bvh, layout, lights, transform
+from incpt.device import Device
+from incpt.scene import Change, Mesh, Scene, diff
+
+
+class DeviceScene:
+    """Buffers that describe a scene to the kernels; `update` follows it through edits.
+
+    features are the preprocessor names that choose a variant of the shading kernels.
+    has_media tells whether any material lets light through.
+    """
+
+    def __init__(self, device: Device, scene: Scene) -> None:
+        self.device = device
+        self.scene = Scene()
+        self.features: tuple[str, ...] = ()
+        self.has_media = False
+        self.light_count = 0
+        self.environment_probability = 0.0
+        self._light_scale = 0.0
+        self._trees: WeakKeyDictionary[Mesh, bvh.Bvh] = WeakKeyDictionary()
+        self._places: dict[Mesh, tuple[int, int, int]] = {}
+        self._buffers: dict[str, cl.Buffer] = {}
+        self._environment: lights.EnvironmentTable | None = None
+        self._rebuild(scene, [name for name, _ in _PARTS])
+
+    def update(self, scene: Scene) -> Change:
+        """Bring the device to `scene`; returns what had changed. On an error the old scene stays."""
+        change = diff(self.scene, scene)
+        before = self.__dict__.copy()
+        self._buffers = dict(self._buffers)
+        try:
+            self._prepare_deformed(scene, change)
+            self._rebuild(scene, [name for name, changed in _PARTS if changed(change)])
+        except Exception:
+            self.__dict__ = before
+            raise
+        return change
+
+    @property
+    def geometry(self) -> tuple[cl.Buffer, ...]:
+        """What traversal reads: top nodes, nodes, packs, objects, materials."""
+        return tuple(self._buffers[n] for n in ("top_nodes", "nodes", "packs", "objects", "materials"))
+
+    @property
+    def emitters(self) -> tuple[cl.Buffer, ...]:
+        """Triangle lights, and the environment's image and tables."""
+        names = ("lights", "environment_image", "marginal", "conditional", "texel_pdf")
+        return tuple(self._buffers[n] for n in names)
+
+    def buffer(self, name: str) -> cl.Buffer:
+        """One of the buffers: materials, layers, normals ..."""
+        return self._buffers[name]
+
+    def _rebuild(self, scene: Scene, parts: list[str]) -> None:
+        self.scene = scene
+        for name in parts:
+            getattr(self, f"_build_{name}")()
+
+    def _upload(self, name: str, array: npt.NDArray[np.generic]) -> None:
+        self._buffers[name] = self.device.upload(np.ascontiguousarray(array))
+
+    def _prepare_deformed(self, scene: Scene, change: Change) -> None:
+        for name in change.deformed:
+            mesh, old = scene.object(name).mesh, self.scene.object(name).mesh
+            if mesh not in self._trees:
+                self._trees[mesh] = bvh.refit_mesh(self.device, self._trees[old], mesh)
+
+    def _tree(self, mesh: Mesh) -> bvh.Bvh:
+        if mesh not in self._trees:
+            self._trees[mesh] = bvh.build_mesh(self.device, mesh)
+        return self._trees[mesh]
+
+    def _build_geometry(self) -> None:
+        meshes = list(dict.fromkeys(obj.mesh for obj in self.scene.objects))
+        trees = [self._tree(mesh) for mesh in meshes]
+        self._places = {}
+        node, pack, normal = 0, 0, 0
+        for mesh, tree in zip(meshes, trees, strict=True):
+            has_normals = mesh.normals is not None
+            self._places[mesh] = (node, pack, normal if has_normals else layout.NO_INDEX)
+            node, pack = node + len(tree.nodes), pack + len(tree.packs)
+            normal += mesh.normals.size if mesh.normals is not None else 0
+        normals = [mesh.normals.ravel() for mesh in meshes if mesh.normals is not None]
+        self._upload("nodes", _joined([tree.nodes for tree in trees], layout.NODE))
+        self._upload("packs", _joined([tree.packs for tree in trees], layout.TRIANGLE_PACK))
+        self._upload("normals", _joined(normals, np.dtype(np.float32)))
+
+    def _build_objects(self) -> None:
+        objects = self.scene.objects
+        index = {name: i for i, name in enumerate(self.scene.materials)}
+        rows = np.zeros(len(objects), layout.OBJECT)
+        for row, obj in zip(rows, objects, strict=True):
+            matrix = obj.world_from_object
+            row["world_from_object"] = matrix.ravel()
+            row["object_from_world"] = transform.invert_affine(matrix).ravel()
+            row["first_node"], row["first_pack"], row["first_normal"] = self._places[obj.mesh]
+            row["material"] = index[obj.material]
+            row["mirrored"] = np.linalg.det(matrix[:, :3]) < 0
+            row["visible"] = obj.visible
+        bounds = np.array([obj.world_bounds for obj in objects]).reshape(-1, 2, 3)
+        self._upload("objects", rows)
+        self._upload("top_nodes", bvh.build_top(self.device, bounds).nodes)
+
+    def _build_environment(self) -> None:
+        image = self.scene.environment.image
+        self._environment = lights.environment_table(image) if image is not None else None
+        table, nothing = self._environment, np.zeros(1, np.float32)
+        self._upload("environment_image", nothing if table is None or image is None else image.pixels)
+        for name in ("marginal", "conditional", "texel_pdf"):
+            self._upload(name, nothing if table is None else getattr(table, name))
+
+    def _build_lights(self) -> None:
+        # Emission of triangles is known before the share of the environment is, which scales the densities.
+        environment = self._environment if any(self.scene.environment.radiance) else None
+        has_triangles = any(
+            obj.visible and self.scene.materials[obj.material].is_emissive for obj in self.scene.objects
+        )
+        share = 0.0 if not has_triangles else 0.5 if environment is not None else 1.0
+        table = lights.triangle_lights(self.scene, share)
+        self.light_count = len(table.rows)
+        if self.light_count == 0:
+            share = 0.0
+        self.environment_probability = 0.0 if environment is None else 1.0 - share
+        self._upload("lights", table.rows if self.light_count else np.zeros(1, layout.LIGHT))
+        self.features = (("ENVIRONMENT_IMAGE",) if environment is not None else ()) + (
+            ("TRIANGLE_LIGHTS",) if self.light_count else ()
+        )
+        self._light_scale = share / table.total if self.light_count else 0.0
+
+    def _build_materials(self) -> None:
+        materials = list(self.scene.materials.values())
+        # One row at least: rays that miss read material 0.
+        rows = np.zeros(max(len(materials), 1), layout.MATERIAL)
+        layers = np.zeros((len(rows), layout.ALBEDO_TABLE_SIZE + 1), np.float32)
+        flags = layout.MaterialFlag
+        for row, layer, material in zip(rows, layers, materials, strict=False):
+            for name in ("base_color", "metallic", "emission", "roughness", "absorption", "specular", "ior",
+                         "transmission", "priority"):  # fmt: skip
+                row[name] = getattr(material, name)
+            row["light_pdf"] = lights.radiant_weight(material) * self._light_scale
+            row["flags"] = (
+                (flags.DOUBLE_SIDED if material.double_sided else 0)
+                | (flags.TRANSMISSIVE if material.transmission > 0 else 0)
+                | (flags.EMISSIVE if material.is_emissive else 0)
+            )
+            layer[:] = albedo.layer_row(material)
+        self.has_media = any(material.transmission > 0 for material in materials)
+        self._upload("materials", rows)
+        self._upload("layers", layers)
+
+
+def _shape_changed(change: Change) -> bool:
+    return bool(change.added or change.removed or change.deformed or change.reshaped)
+
+
+def _objects_changed(change: Change) -> bool:
+    return bool(change.objects or change.reordered or change.materials_added_or_removed)
+
+
+def _emission_changed(change: Change) -> bool:
+    # Whatever may touch an emissive triangle; cheap where there are few of them.
+    return bool(change.objects or change.materials or change.environment or change.environment_image
+                or change.materials_added_or_removed)  # fmt: skip
+
+
+# What is rebuilt, and by which changes; in this order, since lights need the environment and materials
+# the densities of the lights.
+_PARTS: tuple[tuple[str, Callable[[Change], bool]], ...] = (
+    ("geometry", _shape_changed),
+    ("objects", _objects_changed),
+    ("environment", lambda change: change.environment_image),
+    ("lights", _emission_changed),
+    ("materials", _emission_changed),
+)
+
+
+def _joined(arrays: list[npt.NDArray[np.generic]], dtype: np.dtype) -> npt.NDArray[np.generic]:
+    # A kernel argument needs a buffer even where nobody reads it.
+    return np.concatenate(arrays) if arrays else np.zeros(1, dtype)

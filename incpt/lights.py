@@ -1,0 +1,129 @@
+"""Tables for light sampling: emissive triangles chosen by power, and the environment by luminance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from incpt import layout, transform
+from incpt.scene import Image, Material, Scene
+
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def luminance(color: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Rec. 709 luminance of linear colours (..., 3)."""
+    return np.asarray(np.asarray(color, np.float64) @ _LUMINANCE)
+
+
+def radiant_weight(material: Material) -> float:
+    """Power per area that counts in choosing lights: luminance, twice where both sides shine."""
+    return float(luminance(material.emission)) * (2.0 if material.double_sided else 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleLights:
+    """`rows` (N,) layout.LIGHT, in world space; `total` is the sum of area times `radiant_weight`."""
+
+    rows: npt.NDArray[np.void]
+    total: float
+
+
+def triangle_lights(scene: Scene, share: float) -> TriangleLights:
+    """Every visible emissive triangle that has an area. `share` is the chance that light sampling turns to
+    triangles at all; the densities contain it."""
+    parts = []
+    for obj in scene.objects:
+        material = scene.materials[obj.material]
+        if obj.visible and radiant_weight(material) > 0:
+            vertices = transform.apply_affine(obj.world_from_object, obj.mesh.vertices)
+            if np.linalg.det(obj.world_from_object[:, :3]) < 0:
+                # A mirrored face keeps its outside: swap two corners to keep it on the normal's side.
+                parts.append(_rows(vertices[obj.mesh.faces[:, [0, 2, 1]]], material))
+            else:
+                parts.append(_rows(vertices[obj.mesh.faces], material))
+    rows = np.concatenate(parts) if parts else np.zeros(0, layout.LIGHT)
+    weights = rows["pdf_area"] * _areas(rows)
+    rows, weights = rows[weights > 0], weights[weights > 0]
+    total = float(weights.sum())
+    if len(rows):
+        rows["alias_probability"], rows["alias"] = alias_table(weights)
+        rows["pdf_area"] *= share / total
+    return TriangleLights(rows, total)
+
+
+def _rows(corners: npt.NDArray[np.float64], material: Material) -> npt.NDArray[np.void]:
+    rows = np.zeros(len(corners), layout.LIGHT)
+    rows["vertex"] = corners[:, 0]
+    rows["edge_1"] = corners[:, 1] - corners[:, 0]
+    rows["edge_2"] = corners[:, 2] - corners[:, 0]
+    rows["emission"] = material.emission
+    rows["double_sided"] = material.double_sided
+    rows["pdf_area"] = radiant_weight(material)
+    return rows
+
+
+def _areas(rows: npt.NDArray[np.void]) -> npt.NDArray[np.float64]:
+    cross = np.cross(rows["edge_1"].astype(np.float64), rows["edge_2"].astype(np.float64))
+    return np.asarray(np.linalg.norm(cross, axis=1) / 2)
+
+
+def alias_table(
+    weights: npt.NDArray[np.floating],
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.uint32]]:
+    """Walker's alias table by Vose's method (1991): cell i keeps i with probability[i], else gives alias[i]."""
+    count = len(weights)
+    scaled = (np.asarray(weights, np.float64) * (count / np.sum(weights))).tolist()
+    probability, alias = np.ones(count, np.float32), np.arange(count, dtype=np.uint32)
+    small = [i for i, w in enumerate(scaled) if w < 1.0]
+    large = [i for i, w in enumerate(scaled) if w >= 1.0]
+    while small and large:
+        i, j = small.pop(), large[-1]
+        probability[i], alias[i] = scaled[i], j
+        scaled[j] -= 1.0 - scaled[i]
+        if scaled[j] < 1.0:
+            small.append(large.pop())
+    return probability, alias
+
+
+@dataclass(frozen=True, eq=False)
+class EnvironmentTable:
+    """Piecewise constant density over the unit square of a lat-long image, rows from +y.
+
+    marginal     (height + 1,) cumulative distribution of rows
+    conditional  (height, width + 1) of the texels of each row
+    texel_pdf    (height, width) density over the unit square
+    """
+
+    marginal: npt.NDArray[np.float32]
+    conditional: npt.NDArray[np.float32]
+    texel_pdf: npt.NDArray[np.float32]
+
+
+def environment_table(image: Image) -> EnvironmentTable | None:
+    """The table of an image, by luminance times the sine of the polar angle; None where it is black."""
+    brightness = luminance(image.pixels)
+    # Bilinear interpolation carries a texel's light half a texel further; the density follows it there.
+    brightness = (np.roll(brightness, 1, axis=1) + 2 * brightness + np.roll(brightness, -1, axis=1)) / 4
+    padded = np.pad(brightness, ((1, 1), (0, 0)), mode="edge")
+    brightness = (padded[:-2] + 2 * brightness + padded[2:]) / 4
+    height, width = brightness.shape
+    weight = brightness * np.sin((np.arange(height) + 0.5) * np.pi / height)[:, None]
+    total = weight.sum()
+    if not total > 0:
+        return None
+    rows = weight.sum(axis=1)
+    conditional = np.zeros((height, width + 1))
+    np.cumsum(weight, axis=1, out=conditional[:, 1:])
+    # A black row is never chosen; a ramp keeps its table valid.
+    conditional[rows == 0] = np.linspace(0, 1, width + 1)
+    conditional /= conditional[:, -1:]
+    marginal = np.concatenate([[0.0], np.cumsum(rows)]) / total
+    marginal[-1] = 1.0
+    return EnvironmentTable(
+        marginal.astype(np.float32),
+        conditional.astype(np.float32),
+        (weight / total * (width * height)).astype(np.float32),
+    )

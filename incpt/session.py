@@ -1,0 +1,300 @@
+"""A session: one scene, rendered step by step, edited at any time.
+
+`step` does one bounded piece of work and returns; the caller owns the loop. Editor, command line, tests
+and benchmarks share it. What to do next follows from the mode alone (see `modes`): the queue of tiles, how
+often each is repeated, and whether a finished tile replaces or refines what the film has of it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from incpt import layout, tiles, transform
+from incpt.device import Device
+from incpt.device_scene import DeviceScene
+from incpt.errors import InputError
+from incpt.film import Film, path_buffer_stride, tile_image
+from incpt.modes import Event, Mode, next_mode
+from incpt.scene import Change, Object, Scene
+from incpt.settings import RenderSettings
+from incpt.wavefront import Wavefront
+
+# Settings that change what a sample is worth, so that what was accumulated cannot be kept.
+_PICTURE_SETTINGS = (
+    "size", "max_bounces", "transmission_bounces", "roulette_depth", "tile_size", "seed",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class StepReport:
+    """What a step did: its mode, the tiles it finished, the place in the queue after it (in tiles), the
+    paths it traced, its duration in seconds, and how many samples were not finite (they count as black)."""
+
+    mode: Mode
+    tiles: npt.NDArray[np.int32]
+    queue_done: int
+    queue_length: int
+    paths: int
+    seconds: float
+    nonfinite: int
+
+
+@dataclass(frozen=True)
+class Aovs:
+    """First-hit values of the rays through pixel centres: index of the object or -1 (H, W), shading normal
+    in world space (H, W, 3), distance from the camera in metres or infinity (H, W), base colour (H, W, 3)."""
+
+    object_id: npt.NDArray[np.int32]
+    normal: npt.NDArray[np.float32]
+    depth: npt.NDArray[np.float32]
+    albedo: npt.NDArray[np.float32]
+
+
+class Session:
+    """Renders `scene` at `size` (width, height; the settings' by default) with `settings` (the scene's own
+    by default) on `device` (a Device, or what chooses one: see `Device`).
+
+    Raises InputError for a device that is not there, DeviceError where it cannot do the work.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        size: tuple[int, int] | None = None,
+        settings: RenderSettings | None = None,
+        device: Device | str | int | None = None,
+    ) -> None:
+        settings = scene.settings if settings is None else settings
+        self.settings = settings if size is None else replace(settings, size=size)
+        self.device = device if isinstance(device, Device) else Device(device)
+        self._wavefront = Wavefront(self.device)
+        self._device_scene = DeviceScene(self.device, scene)
+        self._start_film()
+
+    @property
+    def scene(self) -> Scene:
+        return self._device_scene.scene
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the image, pixels."""
+        return self.settings.size
+
+    @property
+    def mode(self) -> Mode:
+        return self._mode
+
+    @property
+    def grid(self) -> tiles.TileGrid:
+        return self._grid
+
+    @property
+    def queue(self) -> tiles.Queue:
+        """The tiles that the current mode goes through, in order."""
+        return self._queue
+
+    @property
+    def cursor(self) -> tiles.Cursor:
+        """How far the queue is done."""
+        return self._cursor
+
+    def step(self) -> StepReport:
+        """Render one step: as many slots as the settings allow, at most to the end of the queue."""
+        start = time.perf_counter()
+        mode, queue = self._mode, self._queue
+        plan = tiles.plan(self._grid, queue, self._cursor, self._slot_count(), self._tile_spp)
+        params = self._params(len(plan.slots))
+        slots = self.device.upload(plan.slots)
+        paths = len(plan.slots) * self.settings.tile_size**2
+        self._wavefront.trace(self._device_scene, params, slots, paths, self._radiance)
+        self._film.reduce(params, plan, slots, self._radiance)
+        nonfinite = self._film.take_nonfinite()
+        if queue.replaces:
+            self._tile_spp[plan.finished] = queue.samples
+        else:
+            self._tile_spp[plan.finished] += queue.samples
+        self._cursor = plan.cursor
+        if tiles.is_done(queue, plan.cursor):
+            self._enter(next_mode(mode, Event.QUEUE_DONE, self.settings.strategy))
+        return StepReport(
+            mode, plan.finished, plan.cursor.tiles, len(queue.tiles), paths, time.perf_counter() - start, nonfinite
+        )
+
+    def edit(self, scene: Scene, pixel: tuple[float, float] | None = None) -> Change:
+        """Go on with another scene; returns what differs. `pixel` is the point of change where the settings
+        ask for it, as (x, y) from the top left. On an error the old scene and the picture stay."""
+        old = self.scene
+        change = self._device_scene.update(scene)
+        affected = affected_objects(old, scene, change)
+        if change.is_global:
+            self._enter(next_mode(self._mode, Event.GLOBAL_CHANGE, self.settings.strategy))
+        elif affected:
+            point = pixel if pixel is not None and self.settings.point_of_change == "pixel" else None
+            point = self._point_of_change(affected) if point is None else point
+            self._enter(next_mode(self._mode, Event.LOCAL_CHANGE, self.settings.strategy), point)
+        return change
+
+    def configure(self, settings: RenderSettings) -> None:
+        """Render with other settings from now on. The picture starts over only if samples change meaning."""
+        old, self.settings = self.settings, settings
+        if (old.size, old.tile_size) != (settings.size, settings.tile_size):
+            self._start_film()
+        elif any(getattr(old, name) != getattr(settings, name) for name in _PICTURE_SETTINGS):
+            self._enter(Mode.BASE)
+        elif self._mode is not Mode.INCREMENTAL and self._cursor == tiles.Cursor():
+            self._enter(self._mode)
+        self._resize_path_buffer()
+
+    def render(self, spp: int, on_step: Callable[[StepReport], None] | None = None) -> None:
+        """Step until every pixel shows the scene as it is now with at least `spp` samples."""
+        while self._mode is not Mode.REFINE or self._tile_spp.min() < spp:
+            report = self.step()
+            if on_step is not None:
+                on_step(report)
+
+    def image(self) -> npt.NDArray[np.float32]:
+        """(H, W, 3) mean radiance, linear; row 0 is on top. What is not rendered anew yet shows the old
+        picture, at first black."""
+        return np.ascontiguousarray(self._film.image()[..., :3])
+
+    def spp(self) -> npt.NDArray[np.int64]:
+        """(H, W) samples behind each pixel; 0 where the old picture waits to be thrown away."""
+        return tile_image(self._grid, self._tile_spp)
+
+    def aovs(self) -> Aovs:
+        """Auxiliary images of the scene as it is now; see Aovs."""
+        width, height = self.size
+        tile_count = self._grid.count
+        queue = tiles.Queue(tiles.base_queue(self._grid), 1, True)
+        surface, object_ids = self._first_hits(
+            tiles.plan(self._grid, queue, tiles.Cursor(), tile_count, self._tile_spp).slots, self._params(tile_count)
+        )
+        surface = surface.reshape(7, height, width)
+        return Aovs(
+            object_ids.reshape(height, width),
+            np.ascontiguousarray(np.moveaxis(surface[:3], 0, 2)),
+            surface[3],
+            np.ascontiguousarray(np.moveaxis(surface[4:], 0, 2)),
+        )
+
+    def pick(self, pixel: tuple[int, int]) -> str | None:
+        """The name of the object under a pixel (x, y) from the top left, or None. Raises InputError outside
+        the image."""
+        x, y = int(pixel[0]), int(pixel[1])
+        width, height = self.size
+        if not (0 <= x < width and 0 <= y < height):
+            raise InputError(f"pixel ({x}, {y}): is outside the image of {width} x {height}")
+        slot = np.zeros(1, layout.SLOT)
+        slot["tile_x"], slot["tile_y"], slot["group_count"] = x, y, 1
+        params = self._params(1)
+        params["tile_size"] = 1
+        _, object_ids = self._first_hits(slot, params)
+        index = int(object_ids[y * width + x])
+        return self.scene.objects[index].name if index >= 0 else None
+
+    def _first_hits(
+        self, slots: npt.NDArray[np.void], params: npt.NDArray[np.void]
+    ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]:
+        pixels = self.size[0] * self.size[1]
+        paths = len(slots) * int(params["tile_size"]) ** 2
+        params["pixel_center"] = 1
+        params["buffer_stride"] = paths + layout.WORK_GROUP_SIZE
+        surface, object_ids = self.device.empty(28 * pixels), self.device.empty(4 * pixels)
+        radiance = self.device.empty(12 * (paths + layout.WORK_GROUP_SIZE))
+        self._wavefront.first_hits(
+            self._device_scene, params, self.device.upload(slots), paths, surface, object_ids, radiance
+        )
+        return (
+            self.device.read(surface, np.empty(7 * pixels, np.float32)),
+            self.device.read(object_ids, np.empty(pixels, np.int32)),
+        )
+
+    def _start_film(self) -> None:
+        width, height = self.size
+        self._grid = tiles.TileGrid(width, height, self.settings.tile_size)
+        self._film = Film(self.device, width, height)
+        self._tile_spp = np.zeros(self._grid.count, np.int64)
+        self._buffer_stride = 0
+        self._resize_path_buffer()
+        self._enter(Mode.BASE)
+
+    def _slot_count(self) -> int:
+        slots = self.settings.slots_per_step or self._grid.count
+        return slots * self.settings.sample_rate
+
+    def _resize_path_buffer(self) -> None:
+        stride = path_buffer_stride(self._slot_count(), self.settings.tile_size)
+        if stride != self._buffer_stride:
+            self._radiance = self.device.empty(12 * stride)
+            self._buffer_stride = stride
+
+    def _enter(self, mode: Mode, point_px: tuple[float, float] | None = None) -> None:
+        self._mode = mode
+        self._cursor = tiles.Cursor()
+        incremental = mode is Mode.INCREMENTAL
+        if incremental and point_px is not None:
+            order = tiles.spiral_queue(self._grid, point_px)
+        else:
+            order = tiles.base_queue(self._grid)
+        if mode is Mode.BASE:
+            self._tile_spp[:] = 0
+        repetitions = self.settings.nor if incremental else self.settings.base_nor
+        self._queue = tiles.Queue(order, repetitions * self.settings.sample_rate, mode is not Mode.REFINE)
+
+    def _point_of_change(self, objects: Iterable[Object]) -> tuple[float, float]:
+        """Centre of the 2D bounding box of objects, of its visible part where there is one, in pixels."""
+        width, height = self.size
+        camera = self.scene.camera
+        frame = transform.camera_frame(camera.position, camera.target, camera.up, camera.fov_y, width / height)
+        corners = np.concatenate([transform.box_corners(obj.world_bounds) for obj in objects])
+        pixels, in_front = transform.project(corners, camera.position, frame, self.size)
+        if not in_front.any():
+            return width / 2, height / 2
+        low, high = pixels[in_front].min(axis=0), pixels[in_front].max(axis=0)
+        inner_low, inner_high = np.maximum(low, 0), np.minimum(high, [width, height])
+        if (inner_low < inner_high).all():
+            low, high = inner_low, inner_high
+        x, y = (low + high) / 2
+        return float(x), float(y)
+
+    def _params(self, slot_count: int) -> npt.NDArray[np.void]:
+        width, height = self.size
+        scene, settings = self.scene, self.settings
+        camera = scene.camera
+        params = np.zeros((), layout.PARAMS)
+        right, up, forward = transform.camera_frame(
+            camera.position, camera.target, camera.up, camera.fov_y, width / height
+        )
+        params["camera"] = (camera.position, right, up, forward)
+        params["width"], params["height"] = width, height
+        params["tile_size"], params["slot_count"] = settings.tile_size, slot_count
+        params["buffer_stride"] = self._buffer_stride
+        for name in ("seed", "max_bounces", "transmission_bounces", "roulette_depth"):
+            params[name] = getattr(settings, name)
+        params["light_count"] = self._device_scene.light_count
+        params["environment_probability"] = self._device_scene.environment_probability
+        params["environment_color"] = scene.environment.radiance
+        if scene.environment.image is not None:
+            shape = scene.environment.image.pixels.shape
+            params["environment_height"], params["environment_width"] = shape[:2]
+        params["environment_rotation"] = scene.environment.rotation_y / 360 % 1
+        params["object_count"] = len(scene.objects)
+        return params
+
+
+def affected_objects(old: Scene, new: Scene, change: Change) -> list[Object]:
+    """The objects that look different, as they were and as they are; hidden ones do not count."""
+    pairs = ((old, change.objects - change.added), (new, change.objects - change.removed))
+    return [
+        obj
+        for scene, names in pairs
+        for obj in scene.objects
+        if obj.visible and (obj.name in names or obj.material in change.materials)
+    ]
+
+

@@ -1,0 +1,169 @@
+"""The path tracer as a wavefront of small kernels (Laine, Karras and Aila 2013).
+
+Instead of one kernel with the path loop, each stage of all paths runs as a kernel of its own, over lists
+of the paths that need it: a terminated path costs nothing more, and on PoCL the straight-line stages run
+in SIMD lanes. Paths are traced in chunks whose state fits the caches of a CPU.
+
+    generate -> [ intersect -> (medium_shade) -> shade -> occlude ] once a ray -> radiance of each path
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from incpt import layout
+from incpt.device import Device
+from incpt.device_scene import DeviceScene
+
+_COMPACT_BLOCK = 64  # COMPACT_BLOCK in cl/compact.cl
+_MOST_RAYS = 256
+"""Bound on the rays of a path; kernels end paths before it."""
+
+_Class = layout.PathClass
+
+
+class Wavefront:
+    """Traces the paths of a step on a device; holds the state of one chunk of paths."""
+
+    def __init__(self, device: Device) -> None:
+        self.device = device
+        self.chunk_paths = device.tuning.chunk_paths
+        # The last place is a scratch path, which idle lanes of a group read and write.
+        self.stride = self.chunk_paths + layout.WORK_GROUP_SIZE
+        self._rays, self._paths, self._hits, self._shadows = (
+            device.empty(4 * len(planes) * self.stride)
+            for planes in (layout.RayPlane, layout.PathPlane, layout.HitPlane, layout.ShadowPlane)
+        )
+        for buffer in (self._rays, self._paths, self._hits, self._shadows):
+            device.fill(buffer, 0, buffer.size)
+        self._live, self._next, self._first, self._second = (
+            device.empty(4 * self.stride) for _ in range(4)
+        )
+        self._counters = device.empty(8)
+
+    def trace(
+        self,
+        scene: DeviceScene,
+        params: npt.NDArray[np.void],
+        slots: cl.Buffer,
+        path_count: int,
+        radiance: cl.Buffer,
+    ) -> None:
+        """Trace `path_count` paths, those of `slots` in order; `radiance` holds what each brings, as three
+        planes of params["buffer_stride"] floats."""
+        for first in range(0, path_count, self.chunk_paths):
+            chunk = self._chunk_params(params, first, path_count)
+            self._launch("generate", self.chunk_paths_of(chunk), chunk, slots, self._rays, self._paths, radiance)
+            count, _ = self._compact(chunk, self.chunk_paths_of(chunk), None, _Class.LIVE, self._live)
+            for _ in range(_MOST_RAYS):
+                if count == 0:
+                    break
+                count = self._bounce(scene, chunk, count, radiance)
+
+    def first_hits(
+        self,
+        scene: DeviceScene,
+        params: npt.NDArray[np.void],
+        slots: cl.Buffer,
+        path_count: int,
+        surface: cl.Buffer,
+        object_ids: cl.Buffer,
+        radiance: cl.Buffer,
+    ) -> None:
+        """What camera rays meet: `surface` and `object_ids` as cl/aov.cl fills them, by pixel."""
+        pixels = np.uint32(int(params["width"]) * int(params["height"]))
+        for first in range(0, path_count, self.chunk_paths):
+            chunk = self._chunk_params(params, first, path_count)
+            size = self.chunk_paths_of(chunk)
+            self._launch("generate", size, chunk, slots, self._rays, self._paths, radiance)
+            count, _ = self._compact(chunk, size, None, _Class.LIVE, self._live)
+            self._intersect(scene, chunk, count)
+            self._launch(
+                "aov", size, chunk, pixels, scene.buffer("materials"), self._hits, self._paths, surface,
+                object_ids,
+            )  # fmt: skip
+
+    @staticmethod
+    def chunk_paths_of(chunk: npt.NDArray[np.void]) -> int:
+        return int(chunk["path_count"])
+
+    def _chunk_params(
+        self, params: npt.NDArray[np.void], first: int, path_count: int
+    ) -> npt.NDArray[np.void]:
+        chunk = params.copy()
+        chunk["first_path"] = first
+        chunk["path_count"] = min(self.chunk_paths, path_count - first)
+        chunk["path_stride"] = self.stride
+        return chunk
+
+    def _bounce(
+        self, scene: DeviceScene, params: npt.NDArray[np.void], count: int, radiance: cl.Buffer
+    ) -> int:
+        """One ray of every live path; returns how many paths go on."""
+        self._intersect(scene, params, count)
+        surfaces, surface_count = self._live, count
+        state = (self._hits, self._rays, self._paths, self._shadows, radiance)
+        if scene.has_media:
+            surface_count, medium_count = self._compact(
+                params, count, self._live, _Class.SURFACE, self._first, _Class.MEDIUM, self._second
+            )
+            surfaces = self._first
+            if medium_count:
+                self._launch(
+                    "medium_shade", medium_count, params, np.uint32(medium_count), self._second,
+                    scene.buffer("materials"), *scene.emitters, *state, features=scene.features,
+                )  # fmt: skip
+                # Those that stand on an opaque surface inside a medium join the others.
+                surface_count, _ = self._compact(
+                    params, medium_count, self._second, _Class.SURFACE, self._first, append=True
+                )
+        if surface_count:
+            self._launch(
+                "shade", surface_count, params, np.uint32(surface_count), surfaces, scene.buffer("materials"),
+                scene.buffer("layers"), *scene.emitters, *state, features=scene.features,
+            )  # fmt: skip
+        next_count, shadow_count = self._compact(
+            params, count, self._live, _Class.LIVE, self._next, _Class.SHADOW, self._second
+        )
+        if shadow_count:
+            self._launch(
+                "occlude", shadow_count, params, np.uint32(shadow_count), self._second, *scene.geometry,
+                self._shadows, self._paths, radiance,
+            )  # fmt: skip
+        self._live, self._next = self._next, self._live
+        return next_count
+
+    def _intersect(self, scene: DeviceScene, params: npt.NDArray[np.void], count: int) -> None:
+        self._launch(
+            "intersect", count, params, np.uint32(count), self._live, *scene.geometry, scene.buffer("normals"),
+            self._rays, self._paths, self._hits,
+        )  # fmt: skip
+
+    def _compact(
+        self,
+        params: npt.NDArray[np.void],
+        count: int,
+        source: cl.Buffer | None,
+        first_bits: _Class,
+        first: cl.Buffer,
+        second_bits: _Class = _Class(0),
+        second: cl.Buffer | None = None,
+        append: bool = False,
+    ) -> tuple[int, int]:
+        """Sort paths of `source` (None: all) into lists by class; returns the lengths of both lists."""
+        if not append:
+            self.device.fill(self._counters, 0, 8)
+        self._launch(
+            "compact", -(-count // _COMPACT_BLOCK), params, np.uint32(count), np.uint32(source is None),
+            source or self._live, self._paths, np.uint32(first_bits), first, np.uint32(second_bits),
+            second or self._second, self._counters,
+        )  # fmt: skip
+        lengths = self.device.read(self._counters, np.empty(2, np.uint32))
+        return int(lengths[0]), int(lengths[1])
+
+    def _launch(self, name: str, size: int, *args: Any, features: tuple[str, ...] = ()) -> None:
+        self.device.launch(self.device.kernel(name, features=features), size, *args)
