@@ -57,6 +57,10 @@ class Film:
         """(4, height, width) the sums of red, green and blue, and the number of samples."""
         return self.device.read(self._sums, np.empty((_PLANES, self.height, self.width), np.float32))
 
+    def restore(self, sums: npt.NDArray[np.float32]) -> None:
+        """Make the film hold what `sums` returned of one of the same size."""
+        self.device.write(self._sums, sums)
+
 
 def tile_image(grid: TileGrid, per_tile: npt.NDArray[np.integer]) -> npt.NDArray[np.int64]:
     """(height, width) a value per tile, spread over the pixels."""

@@ -55,6 +55,19 @@ class Aovs:
     albedo: npt.NDArray[np.float32]
 
 
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """A picture on the host and where its session stood; see `Session.snapshot`."""
+
+    scene: Scene
+    settings: RenderSettings
+    sums: npt.NDArray[np.float32]
+    tile_spp: npt.NDArray[np.int64]
+    mode: Mode
+    queue: tiles.Queue
+    cursor: tiles.Cursor
+
+
 class Session:
     """Renders `scene` at `size` (width, height; the settings' by default) with `settings` (the scene's own
     by default) on `device` (a Device, or what chooses one: see `Device`).
@@ -156,6 +169,28 @@ class Session:
             report = self.step()
             if on_step is not None:
                 on_step(report)
+
+    def snapshot(self) -> Snapshot:
+        """Scene, settings and picture as they are now, for `restore`."""
+        return Snapshot(
+            self.scene,
+            self.settings,
+            self._film.sums(),
+            self._tile_spp.copy(),
+            self._mode,
+            self._queue,
+            self._cursor,
+        )
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from where a session stood. A tile that was under way then starts again."""
+        self._device_scene.update(snapshot.scene)
+        self.settings = snapshot.settings
+        self._start_film()
+        self._film.restore(snapshot.sums)
+        self._tile_spp = snapshot.tile_spp.copy()
+        self._mode, self._queue = snapshot.mode, snapshot.queue
+        self._cursor = tiles.Cursor(snapshot.cursor.tiles)
 
     def image(self) -> npt.NDArray[np.float32]:
         """(H, W, 3) mean radiance, linear; row 0 is on top. What is not rendered anew yet shows the old
