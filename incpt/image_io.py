@@ -1,0 +1,234 @@
+"""Pictures on disk: OpenEXR (linear radiance, any layers) and PNG (tone-mapped sRGB).
+
+The display curve is AgX by Troy Sobotka in the polynomial form of Benjamin Wrensch ("Minimal AgX
+Implementation", iolite-engine.com, 2023), the default look of Blender 4: bright colours run into white
+instead of clipping to a primary, and greys stay grey.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import threading
+import weakref
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import OpenEXR
+import PIL.Image
+
+from incpt.errors import InputError, in_place, one_line
+from incpt.files import check_readable, write_atomically, write_bytes
+from incpt.layout import ENVIRONMENT_MAX_SIZE
+from incpt.scene import Image
+
+Float32Image = npt.NDArray[np.float32]
+
+CURVES = ("agx", "srgb")
+RINGING = 0.01
+"""How far below zero, as a fraction of the mean, a pixel may lie to count as an artefact of compression."""
+
+_AGX_INSET = np.array(
+    [
+        [0.842479062253094, 0.0784335999999992, 0.0792237451477643],
+        [0.0423282422610123, 0.878468636469772, 0.0791661274605434],
+        [0.0423756549057051, 0.0784336, 0.879142973793104],
+    ]
+)
+_AGX_INSET /= _AGX_INSET.sum(axis=1, keepdims=True)  # printed digits sum to 1.0001: greys took a tint
+_AGX_OUTSET = np.linalg.inv(_AGX_INSET)
+_AGX_LOG2_RANGE = (-12.47393, 4.026069)
+# Of x^6 down to 1; Wrensch's fit, mean squared error 3.7e-6.
+_AGX_POLYNOMIAL = (15.5, -40.14, 31.96, -6.868, 0.4298, 0.1191, -0.00232)
+
+_UNDEFINED_PIXEL = (255, 0, 255)
+_quiet_lock = threading.Lock()
+_images: weakref.WeakValueDictionary[tuple[str, int, int], Image] = weakref.WeakValueDictionary()
+
+
+def tone_map(linear: npt.ArrayLike, exposure: float = 0.0, curve: str = "agx") -> npt.NDArray[np.uint8]:
+    """(..., 3) linear radiance to display values 0 to 255, sRGB encoded.
+
+    `exposure` is in stops. `curve` is "agx" (greys stay neutral, mid-grey 0.18 becomes 127, white
+    1.0 becomes 201, what is brighter has room) or "srgb" (the plain transfer function, clipped at 1).
+    Infinite radiance becomes white; undefined pixels (NaN) become magenta, so that they are seen.
+    Raises InputError.
+    """
+    if curve not in CURVES:
+        raise InputError(f"curve: {curve!r} is not known; choose one of {', '.join(CURVES)}")
+    radiance = np.asarray(linear, np.float64)
+    if radiance.shape[-1:] != (3,):
+        raise InputError(f"image: has shape {radiance.shape}; a picture has shape (height, width, 3)")
+    undefined = np.isnan(radiance).any(axis=-1)
+    scaled = np.clip(np.nan_to_num(radiance, posinf=1e30) * 2.0**exposure, 0.0, 1e30)
+    encoded = _agx(scaled) if curve == "agx" else _srgb(scaled)
+    result = np.rint(np.clip(encoded, 0.0, 1.0) * 255.0).astype(np.uint8)
+    result[undefined] = _UNDEFINED_PIXEL
+    return result
+
+
+def _srgb(linear: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """IEC 61966-2-1."""
+    x = np.minimum(linear, 1.0)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+
+
+def _agx(linear: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    low, high = _AGX_LOG2_RANGE
+    inset = np.maximum(linear @ _AGX_INSET.T, 1e-10)
+    x = np.clip((np.log2(inset) - low) / (high - low), 0.0, 1.0)
+    result: npt.NDArray[np.float64] = np.polyval(_AGX_POLYNOMIAL, x) @ _AGX_OUTSET.T
+    return result
+
+
+def write_png(
+    path: str | os.PathLike[str], image: npt.ArrayLike, exposure: float = 0.0, curve: str = "agx"
+) -> None:
+    """Writes a (H, W, 3) picture of linear radiance as 8-bit sRGB, atomically; see `tone_map`.
+
+    Raises OutputError where the file cannot be written, InputError for an array that is no picture.
+    """
+    pixels = tone_map(image, exposure, curve)
+    if pixels.ndim != 3 or pixels.size == 0:
+        raise InputError(f"image: has shape {pixels.shape}; a picture has shape (height, width, 3)")
+    encoded = io.BytesIO()
+    PIL.Image.fromarray(pixels, "RGB").save(encoded, "PNG")
+    write_bytes(Path(path), encoded.getvalue())
+
+
+def write_exr(path: str | os.PathLike[str], layers: Mapping[str, npt.NDArray[Any]]) -> None:
+    """Writes layers of one picture, atomically.
+
+    A (H, W) array is one channel under its name ("depth.Z", "object_id"). A (H, W, n) array is n
+    channels, named by the last letters of its name: "RGB" is R, G, B and "normal.XYZ" is normal.X,
+    normal.Y, normal.Z. uint32 is kept, everything else becomes float32. Raises OutputError where the
+    file cannot be written, InputError for layers that do not fit together.
+    """
+    channels: dict[str, npt.NDArray[Any]] = {}
+    for name, values in layers.items():
+        channels.update(_channels(name, np.asarray(values)))
+    shapes = {channel.shape for channel in channels.values()}
+    if len(shapes) != 1 or 0 in next(iter(shapes)):
+        raise InputError(f"layers: have sizes {sorted(shapes)}; a picture needs layers of one size")
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+
+    def write(temporary: Path) -> None:
+        try:
+            with _quiet():
+                OpenEXR.File(header, channels).write(str(temporary))
+        except RuntimeError as error:
+            raise OSError(one_line(error).replace(str(temporary), Path(path).name)) from None
+
+    write_atomically(Path(path), write)
+
+
+def _channels(name: str, values: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
+    kind = np.uint32 if values.dtype == np.uint32 else np.float32
+    values = values.astype(kind, copy=False)
+    prefix, dot, letters = name.rpartition(".")
+    if values.ndim == 2 and name:
+        return {name: np.ascontiguousarray(values)}
+    if values.ndim != 3 or len(letters) != values.shape[2] or len(set(letters)) != len(letters):
+        raise InputError(
+            f"layer {name!r}: has shape {values.shape}; use (H, W), or (H, W, 3) named like 'RGB'"
+        )
+    return {prefix + dot + c: np.ascontiguousarray(values[..., i]) for i, c in enumerate(letters)}
+
+
+def load_image(path: str | os.PathLike[str]) -> Image:
+    """Reads an OpenEXR environment image: channels R, G, B (also of one layer, "name.R"), or Y alone.
+
+    The same file, unchanged, gives the same Image as long as that is in use. Raises InputError: a file
+    that is missing, damaged, too large or no OpenEXR, other channels, radiance that is negative or not
+    finite.
+    """
+    path = Path(path)
+    status = check_readable(path)
+    key = (os.path.realpath(path), status.st_mtime_ns, status.st_size)
+    image = _images.get(key)
+    if image is None:
+        with in_place(str(path)):
+            pixels = _without_ringing(_read_exr(path))
+            image = _images[key] = Image(pixels, source=os.path.abspath(path))
+    return image
+
+
+def _without_ringing(pixels: Float32Image) -> Float32Image:
+    """Lossy codecs (DWAB, most HDRIs) leave slightly negative pixels beside bright ones: those become 0."""
+    negative = pixels < 0
+    if negative.any() and pixels.min() >= -RINGING * pixels.mean(dtype=np.float64):
+        return np.where(negative, np.float32(0), pixels)
+    return pixels
+
+
+def _read_exr(path: Path) -> Float32Image:
+    try:
+        with _quiet():
+            header = OpenEXR.File(str(path), header_only=True).header()
+            _check_size(header)
+            pixels = {
+                name: channel.pixels
+                for name, channel in OpenEXR.File(str(path), separate_channels=True).channels().items()
+            }
+    except InputError:
+        raise
+    except Exception:  # the library raises RuntimeError, ValueError, TypeError … for damaged files
+        raise InputError("is no OpenEXR image, or a damaged one; save it again as OpenEXR") from None
+    if pixels and all(isinstance(p, np.ndarray) and p.ndim == 2 for p in pixels.values()):
+        for names in _colour_names(set(pixels)):
+            planes = [pixels[name] for name in names]
+            if len({plane.shape for plane in planes}) == 1:
+                with np.errstate(invalid="ignore", over="ignore"):
+                    return np.stack(planes, axis=-1).astype(np.float32)
+    listed = ", ".join(sorted(pixels)[:12]) or "none"
+    raise InputError(f"has no channels R, G, B or Y of full size, but {listed}; save it as RGB")
+
+
+def _check_size(header: Mapping[str, Any]) -> None:
+    """Before the pixels are read: a damaged header may ask for any amount of memory."""
+    low, high = header["dataWindow"]
+    width, height = (int(high[axis]) - int(low[axis]) + 1 for axis in (0, 1))
+    if not (0 < width <= ENVIRONMENT_MAX_SIZE and 0 < height <= ENVIRONMENT_MAX_SIZE):
+        raise InputError(
+            f"is {width} x {height} pixels; an environment image has 1 to {ENVIRONMENT_MAX_SIZE} a side"
+        )
+
+
+def _colour_names(names: set[str]) -> Iterator[tuple[str, str, str]]:
+    """Channel names of red, green and blue, the plain ones first, then those of the first layer."""
+    layers = sorted(name[:-1] for name in names if name[-1:] == "R")
+    for prefix in ["", *layers]:
+        if {prefix + c for c in "RGB"} <= names:
+            yield prefix + "R", prefix + "G", prefix + "B"
+    # With RY and BY the file is luminance and subsampled chroma, of which Y alone would lose the colour.
+    if "Y" in names and not {"RY", "BY"} & names:
+        yield "Y", "Y", "Y"
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Mutes the process's stdout and stderr: OpenEXR prints each error there before it raises it."""
+    with _quiet_lock:
+        saved = []
+        with suppress(OSError):  # a process started without them
+            saved = [(number, os.dup(number)) for number in (1, 2)]
+        null = os.open(os.devnull, os.O_WRONLY)
+        try:
+            for number, _ in saved:
+                os.dup2(null, number)
+            yield
+        finally:
+            for number, copy in saved:
+                os.dup2(copy, number)
+                os.close(copy)
+            os.close(null)
+
+
+def digest(pixels: Float32Image) -> str:
+    """A short text that differs for different pixels."""
+    return hashlib.sha256(f"{pixels.shape}".encode() + pixels.tobytes()).hexdigest()[:12]
