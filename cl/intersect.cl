@@ -1,5 +1,6 @@
 // Finds the nearest hit of each path's ray and describes the surface there.
 
+#include "scalar.cl"
 #include "bvh.cl"
 
 // Rounding errors of position and of the next ray's test, in units of float32's half ulp: see offset_bound.
@@ -13,7 +14,7 @@ static void scale_to_unit(float *v) {
     largest = bvh_abs(v[2]) > largest ? bvh_abs(v[2]) : largest;
     // In two steps, because squares of very small or large components would leave the range of a float.
     const float x = v[0] / largest, y = v[1] / largest, z = v[2] / largest;
-    const float scale = 1.0f / sqrt(x * x + y * y + z * z);
+    const float scale = 1.0f / SQRT(x * x + y * y + z * z);
     v[0] = x * scale;
     v[1] = y * scale;
     v[2] = z * scale;
@@ -79,6 +80,35 @@ static void shading_normal(__global const Object *object, __global const float *
             result[i] = -result[i];
 }
 
+// Writes all planes of a hit but its distance and object.
+BVH_CALL void write_hit(const BvhHit *hit, uint k, uint stride, __global const Object *object,
+                        __global const TrianglePack *packs, __global const float *normals,
+                        __global float *hits) {
+    __global const TrianglePack *pack = packs + object->first_pack + hit->pack;
+    const uint face = pack->face[hit->lane];
+    const float scale = 1.0f / (hit->weight[0] + hit->weight[1] + hit->weight[2]);
+    float vertex[3][3], weight[3], point[3], position[3], normal[3], geometric[3], shading[3];
+    for (uint i = 0; i < 3; i++) {
+        weight[i] = hit->weight[i] * scale;
+        for (uint axis = 0; axis < 3; axis++)
+            vertex[i][axis] = pack->vertex[3 * i + axis][hit->lane];
+    }
+    for (uint i = 0; i < 3; i++)
+        point[i] = weight[0] * vertex[0][i] + weight[1] * vertex[1][i] + weight[2] * vertex[2][i];
+    bvh_transform_point(object->world_from_object, point, position);
+    bvh_normal(vertex, normal);
+    world_normal(object, normal, geometric);
+    shading_normal(object, normals, face, weight, geometric, shading);
+    hits[HIT_OFFSET * stride + k] = offset_bound(object, vertex, geometric);
+    hits[HIT_MATERIAL * stride + k] = as_float(object->material);
+    hits[HIT_TRIANGLE * stride + k] = as_float(face);
+    for (uint i = 0; i < 3; i++) {
+        hits[(HIT_POSITION_X + i) * stride + k] = position[i];
+        hits[(HIT_GEOMETRIC_X + i) * stride + k] = geometric[i];
+        hits[(HIT_SHADING_X + i) * stride + k] = shading[i];
+    }
+}
+
 __kernel void intersect(const Params params, const uint count, __global const uint *list,
                         __global const Node *top_nodes, __global const Node *nodes,
                         __global const TrianglePack *packs, __global const Object *objects,
@@ -87,52 +117,19 @@ __kernel void intersect(const Params params, const uint count, __global const ui
     if (get_global_id(0) >= count)
         return;
     const uint k = list[get_global_id(0)], stride = params.path_stride;
-    float origin[3], direction[3];
-    for (uint i = 0; i < 3; i++) {
-        origin[i] = rays[(RAY_ORIGIN_X + i) * stride + k];
-        direction[i] = rays[(RAY_DIRECTION_X + i) * stride + k];
-    }
     BvhHit hit;
     hit.distance = INFINITY;
-    bvh_trace(origin, direction, top_nodes, nodes, packs, objects, false, &hit);
+    bvh_trace(rays + RAY_ORIGIN_X * stride + k, rays + RAY_DIRECTION_X * stride + k, stride, top_nodes, nodes,
+              packs, objects, false, &hit);
     hits[HIT_DISTANCE * stride + k] = hit.distance;
     hits[HIT_OBJECT * stride + k] = as_float(hit.object);
-    if (hit.object == NO_INDEX) {
-        paths[PATH_CLASS * stride + k] = as_float((uint)(CLASS_LIVE | CLASS_SURFACE));
-        return;
+    uint kind = CLASS_SURFACE;
+    if (hit.object != NO_INDEX) {
+        __global const Object *object = objects + hit.object;
+        write_hit(&hit, k, stride, object, packs, normals, hits);
+        const bool in_medium = as_uint(paths[PATH_MEDIUM_0 * stride + k]) != NO_INDEX;
+        const bool transmissive = materials[object->material].flags & MATERIAL_TRANSMISSIVE;
+        kind = in_medium || transmissive ? CLASS_MEDIUM : CLASS_SURFACE;
     }
-
-    __global const Object *object = objects + hit.object;
-    __global const TrianglePack *pack = packs + object->first_pack + hit.pack;
-    const BvhRay ray = bvh_object_ray(object, origin, direction);
-    float weight[3], depth;
-    bvh_edges1(&ray, pack, hit.lane, &weight[0], &weight[1], &weight[2], &depth);
-    const float scale = 1.0f / (weight[0] + weight[1] + weight[2]);
-    float vertex[3][3], point[3], position[3];
-    for (uint i = 0; i < 3; i++) {
-        weight[i] *= scale;
-        for (uint axis = 0; axis < 3; axis++)
-            vertex[i][axis] = pack->vertex[3 * i + axis][hit.lane];
-    }
-    for (uint i = 0; i < 3; i++)
-        point[i] = weight[0] * vertex[0][i] + weight[1] * vertex[1][i] + weight[2] * vertex[2][i];
-    bvh_transform_point(object->world_from_object, point, position);
-    float normal[3], geometric[3], shading[3];
-    bvh_normal(vertex, normal);
-    world_normal(object, normal, geometric);
-    const uint face = pack->face[hit.lane];
-    shading_normal(object, normals, face, weight, geometric, shading);
-
-    for (uint i = 0; i < 3; i++) {
-        hits[(HIT_POSITION_X + i) * stride + k] = position[i];
-        hits[(HIT_GEOMETRIC_X + i) * stride + k] = geometric[i];
-        hits[(HIT_SHADING_X + i) * stride + k] = shading[i];
-    }
-    hits[HIT_OFFSET * stride + k] = offset_bound(object, vertex, geometric);
-    hits[HIT_MATERIAL * stride + k] = as_float(object->material);
-    hits[HIT_TRIANGLE * stride + k] = as_float(face);
-    const bool in_medium = as_uint(paths[PATH_MEDIUM_0 * stride + k]) != NO_INDEX;
-    const bool transmissive = materials[object->material].flags & MATERIAL_TRANSMISSIVE;
-    const uint kind = in_medium || transmissive ? CLASS_MEDIUM : CLASS_SURFACE;
     paths[PATH_CLASS * stride + k] = as_float(CLASS_LIVE | kind);
 }

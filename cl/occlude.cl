@@ -15,15 +15,11 @@ __kernel void occlude(const Params params, const uint count, __global const uint
     if (get_global_id(0) >= count)
         return;
     const uint k = list[get_global_id(0)], stride = params.path_stride;
-    float origin[3], direction[3];
-    for (uint i = 0; i < 3; i++) {
-        origin[i] = shadows[(SHADOW_ORIGIN_X + i) * stride + k];
-        direction[i] = shadows[(SHADOW_DIRECTION_X + i) * stride + k];
-    }
     const float distance = shadows[SHADOW_DISTANCE * stride + k];
     BvhHit hit;
     hit.distance = distance;
-    if (bvh_trace(origin, direction, top_nodes, nodes, packs, objects, true, &hit))
+    if (bvh_trace(shadows + SHADOW_ORIGIN_X * stride + k, shadows + SHADOW_DIRECTION_X * stride + k, stride,
+                  top_nodes, nodes, packs, objects, true, &hit))
         return;
     const uint medium = as_uint(paths[PATH_MEDIUM_0 * stride + k]) & MEDIUM_NONE;
     for (uint c = 0; c < 3; c++) {
