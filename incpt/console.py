@@ -1,0 +1,87 @@
+"""What the commands share on the terminal: a progress bar for paths, and a Ctrl-C that stops cleanly."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+
+class Interruption:
+    """Whether Ctrl-C was pressed. `check` is for places where work can stop without loss."""
+
+    def __init__(self) -> None:
+        self.requested = False
+
+    def check(self) -> None:
+        """Raises KeyboardInterrupt where Ctrl-C was pressed."""
+        if self.requested:
+            raise KeyboardInterrupt
+
+    def _on_signal(self, signum: int, frame: FrameType | None) -> None:
+        if self.requested:  # pressed again: whoever does that does not want to wait for the step's end
+            raise KeyboardInterrupt
+        self.requested = True
+
+
+@contextmanager
+def interruption() -> Iterator[Interruption]:
+    """Inside, the first Ctrl-C only sets a flag, so that no step is torn in the middle."""
+    state = Interruption()
+    if threading.current_thread() is not threading.main_thread():
+        yield state  # signals reach the main thread only
+        return
+    previous = signal.signal(signal.SIGINT, state._on_signal)
+    try:
+        yield state
+    finally:
+        signal.signal(signal.SIGINT, previous)
+
+
+class PathProgress:
+    """A bar that counts paths, with their rate and what they make in samples per pixel."""
+
+    def __init__(self, progress: Progress, total: int, pixels: int) -> None:
+        self._progress = progress
+        self._task = progress.add_task("", total=total, rate="", spp="")
+        self._pixels = pixels
+        self._start = time.perf_counter()
+        self._paths = 0
+
+    def describe(self, what: str) -> None:
+        """What is being done now."""
+        self._progress.update(self._task, description=what)
+
+    def advance(self, paths: int) -> None:
+        """So many paths more are done."""
+        self._paths += paths
+        seconds = max(time.perf_counter() - self._start, 1e-9)
+        self._progress.update(
+            self._task,
+            completed=self._paths,
+            rate=f"{self._paths / seconds / 1e6:.2f} Mpaths/s",
+            spp=f"{self._paths / self._pixels:.0f} spp",
+        )
+
+
+@contextmanager
+def path_progress(what: str, total: int, pixels: int) -> Iterator[PathProgress]:
+    """A progress bar on stderr for `total` paths of an image of so many `pixels`."""
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TaskProgressColumn(),
+        TextColumn("{task.fields[spp]}"),
+        TextColumn("{task.fields[rate]}"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        bar = PathProgress(progress, total, pixels)
+        bar.describe(what)
+        yield bar
