@@ -97,7 +97,7 @@ def write_png(
     if pixels.ndim != 3 or pixels.size == 0:
         raise InputError(f"image: has shape {pixels.shape}; a picture has shape (height, width, 3)")
     encoded = io.BytesIO()
-    PIL.Image.fromarray(pixels, "RGB").save(encoded, "PNG")
+    PIL.Image.fromarray(pixels).save(encoded, "PNG")
     write_bytes(Path(path), encoded.getvalue())
 
 

@@ -199,6 +199,10 @@ class Object:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise InputError(f"name: {self.name!r} is not a name; give the object a text")
+        if not isinstance(self.mesh, Mesh):
+            raise InputError(f"mesh: {self.mesh!r} is not a Mesh; use shape() or load_mesh()")
+        if not isinstance(self.material, str):
+            raise InputError(f"material: {self.material!r} is not the name of a material")
         if not isinstance(self.visible, bool):
             raise InputError(f"visible: {self.visible!r} is not true or false")
         for name in ("position", "rotation", "scale"):
@@ -425,7 +429,10 @@ def _set_vector(owner: object, name: str, low: float = -LARGEST, high: float = L
 def _number(name: str, value: Any, low: float, high: float) -> float:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise InputError(f"{name}: {value!r} is not a number")
-    number = float(value)
+    try:
+        number = float(value)
+    except OverflowError:
+        raise InputError(f"{name}: a whole number that large is out of range; use {low:g} to {high:g}") from None
     if not math.isfinite(number):
         raise InputError(f"{name}: {number} is not a finite number")
     if not low <= number <= high:
