@@ -193,7 +193,7 @@ def render(
         _write_picture(output, session)
     samples = int(session.spp().min())
     if nonfinite:
-        _complain(f"warning: {nonfinite:,} samples were not finite and were left out", 0)
+        _complain(f"warning: {nonfinite:,} samples were not finite and count as black", 0)
     print(f"{output}: {session.size[0]} x {session.size[1]}, {samples} samples per pixel")
     if stop.requested:
         raise typer.Exit(_complain(f"stopped at {samples} of {spp} samples per pixel", INTERRUPTED))

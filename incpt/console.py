@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -47,15 +48,19 @@ def interruption() -> Iterator[Interruption]:
 class PathProgress:
     """A bar that counts paths, with their rate and what they make in samples per pixel."""
 
-    def __init__(self, progress: Progress, total: int, pixels: int) -> None:
+    def __init__(self, progress: Progress, what: str, total: int, pixels: int) -> None:
         self._progress = progress
-        self._task = progress.add_task("", total=total, rate="", spp="")
+        self._task = progress.add_task(what, total=total, rate="", spp="")
+        self._what = what
         self._pixels = pixels
         self._start = time.perf_counter()
         self._paths = 0
 
     def describe(self, what: str) -> None:
-        """What is being done now."""
+        """What is being done now; a line of its own where there is no terminal for a bar."""
+        if what != self._what and not self._progress.console.is_terminal:
+            print(what, file=sys.stderr)
+        self._what = what
         self._progress.update(self._task, description=what)
 
     def advance(self, paths: int) -> None:
@@ -81,7 +86,6 @@ def path_progress(what: str, total: int, pixels: int) -> Iterator[PathProgress]:
         TextColumn("{task.fields[rate]}"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        bar = PathProgress(progress, total, pixels)
-        bar.describe(what)
-        yield bar
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        yield PathProgress(progress, what, total, pixels)

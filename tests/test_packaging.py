@@ -1,0 +1,89 @@
+"""What is installed: one import package with everything in it, and a renderer without a window."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+import zipfile
+from importlib import resources
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+WINDOW = {"glfw", "imgui_bundle", "moderngl"}
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Names of the files in a wheel that is built from this checkout."""
+    folder = tmp_path_factory.mktemp("wheel")
+    # Of a copy: setuptools leaves build/ and egg-info in the folder that it builds.
+    names = [ROOT / name for name in ("pyproject.toml", "README.md", "LICENSE")]
+    names += [ROOT / name for name in ("incpt", "cl", "ui", "scenes", "benchmarks")]
+    copy = folder / "incpt"
+    copy.mkdir()
+    subprocess.run(["cp", "-r", *map(str, names), str(copy)], check=True)
+    command = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--quiet", "-w", str(folder), str(copy)]
+    try:
+        import setuptools
+
+        if int(setuptools.__version__.split(".")[0]) >= 77:
+            command.insert(4, "--no-build-isolation")
+    except ImportError:
+        pass
+    subprocess.run(command, check=True, capture_output=True, timeout=300)
+    (path,) = folder.glob("*.whl")
+    with zipfile.ZipFile(path) as archive:
+        return archive.namelist()
+
+
+@pytest.mark.slow
+def test_wheel_has_one_package(wheel: list[str]) -> None:
+    top = {name.split("/")[0] for name in wheel}
+    assert {name for name in top if not name.endswith(".dist-info")} == {"incpt"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("folder", "pattern"), [("cl", "*.cl"), ("scenes", "*.toml"), ("incpt", "*.py"), ("incpt", "py.typed")]
+)
+def test_wheel_has_every_file(wheel: list[str], folder: str, pattern: str) -> None:
+    prefix = "incpt" if folder == "incpt" else f"incpt/{folder}"
+    expected = {f"{prefix}/{path.name}" for path in (ROOT / folder).glob(pattern)}
+    assert expected
+    assert expected <= set(wheel)
+
+
+@pytest.mark.slow
+def test_wheel_has_what_the_scenes_name(wheel: list[str]) -> None:
+    ours = [path for path in (ROOT / "scenes").iterdir() if path.suffix in {".ply", ".exr", ".glb", ".md"}]
+    assert {f"incpt/scenes/{path.name}" for path in ours} <= set(wheel)
+
+
+def test_kernels_and_scenes_are_found_as_resources() -> None:
+    assert any(item.name.endswith(".cl") for item in resources.files("incpt.cl").iterdir())
+    assert any(item.name.endswith(".toml") for item in resources.files("incpt.scenes").iterdir())
+
+
+def test_importing_incpt_opens_no_window_library() -> None:
+    code = "import sys, incpt, incpt.cli; print(*sys.modules)"
+    modules = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    loaded = {name.split(".")[0] for name in modules.split()} | set(modules.split())
+    assert "incpt.cli" in loaded
+    assert not loaded & (WINDOW | {"incpt.ui", "incpt.benchmarks"})
+
+
+def test_no_module_names_the_window() -> None:
+    for path in (ROOT / "incpt").glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Import):
+                names = {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                names = {f"{node.module}.{alias.name}" for alias in node.names}
+            else:
+                continue
+            for name in names:
+                assert not name.startswith(("incpt.ui", "incpt.benchmarks")), path
+                assert name.split(".")[0] not in WINDOW, path
