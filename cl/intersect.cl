@@ -1,6 +1,5 @@
 // Finds the nearest hit of each path's ray and describes the surface there.
 
-#include "scalar.cl"
 #include "bvh.cl"
 
 // Rounding errors of position and of the next ray's test, in units of float32's half ulp: see offset_bound.
@@ -8,33 +7,32 @@
 #define TEST_ULPS 16.0f
 #define HALF_ULP 5.9604645e-8f
 
-static void scale_to_unit(float *v) {
-    float largest = bvh_abs(v[0]);
-    largest = bvh_abs(v[1]) > largest ? bvh_abs(v[1]) : largest;
-    largest = bvh_abs(v[2]) > largest ? bvh_abs(v[2]) : largest;
-    // In two steps, because squares of very small or large components would leave the range of a float.
-    const float x = v[0] / largest, y = v[1] / largest, z = v[2] / largest;
-    const float scale = 1.0f / SQRT(x * x + y * y + z * z);
-    v[0] = x * scale;
-    v[1] = y * scale;
-    v[2] = z * scale;
+// Scaled before it is squared, because squares of very small or large components would leave the range of a
+// float.
+INLINE void make_unit(float *v) {
+    const float scale = bvh_scale(bvh_largest3(v[0], v[1], v[2]));
+    const float x = v[0] * scale, y = v[1] * scale, z = v[2] * scale;
+    const float inverse = 1.0f / SQRT(x * x + y * y + z * z);
+    v[0] = x * inverse;
+    v[1] = y * inverse;
+    v[2] = z * inverse;
 }
 
-static float dot3(const float *a, const float *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+INLINE float dot3(const float *a, const float *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // A normal of object space in world space: by the inverse transpose, which keeps the outside outside, also
 // where the object is mirrored.
-static void world_normal(__global const Object *object, const float *normal, float *result) {
+INLINE void world_normal(__global const Object *object, const float *normal, float *result) {
     __global const float *m = object->object_from_world;
     for (uint i = 0; i < 3; i++)
         result[i] = m[i] * normal[0] + m[4 + i] * normal[1] + m[8 + i] * normal[2];
-    scale_to_unit(result);
+    make_unit(result);
 }
 
 // How far along the unit normal a ray must start to be clear of the surface. Bounds, axis by axis as in
 // pbrt-v4 section 6.8, the rounding of the hit position (interpolation, transform to world space) and of the
 // next ray's origin (transform to object space); and, by the triangle's extent, the error of the test itself.
-static float offset_bound(__global const Object *object, const float (*vertex)[3], const float *normal) {
+INLINE float offset_bound(__global const Object *object, const float (*vertex)[3], const float *normal) {
     __global const float *w = object->world_from_object, *m = object->object_from_world;
     float largest[3], extent[3], world[3], back[3], bound = 0.0f, test = 0.0f;
     for (uint i = 0; i < 3; i++) {
@@ -45,28 +43,28 @@ static float offset_bound(__global const Object *object, const float (*vertex)[3
         extent[i] = high - low;
     }
     for (uint i = 0; i < 3; i++)
-        world[i] = bvh_abs(w[4 * i]) * largest[0] + bvh_abs(w[4 * i + 1]) * largest[1] +
-                   bvh_abs(w[4 * i + 2]) * largest[2] + bvh_abs(w[4 * i + 3]);
+        world[i] = FABS(w[4 * i]) * largest[0] + FABS(w[4 * i + 1]) * largest[1] +
+                   FABS(w[4 * i + 2]) * largest[2] + FABS(w[4 * i + 3]);
     for (uint i = 0; i < 3; i++)
-        back[i] = bvh_abs(m[4 * i]) * world[0] + bvh_abs(m[4 * i + 1]) * world[1] +
-                  bvh_abs(m[4 * i + 2]) * world[2] + bvh_abs(m[4 * i + 3]);
+        back[i] = FABS(m[4 * i]) * world[0] + FABS(m[4 * i + 1]) * world[1] + FABS(m[4 * i + 2]) * world[2] +
+                  FABS(m[4 * i + 3]);
     for (uint i = 0; i < 3; i++) {
-        const float x = bvh_abs(w[4 * i]), y = bvh_abs(w[4 * i + 1]), z = bvh_abs(w[4 * i + 2]);
-        bound += bvh_abs(normal[i]) * (world[i] + x * back[0] + y * back[1] + z * back[2]);
+        const float x = FABS(w[4 * i]), y = FABS(w[4 * i + 1]), z = FABS(w[4 * i + 2]);
+        bound += FABS(normal[i]) * (world[i] + x * back[0] + y * back[1] + z * back[2]);
         const float size = x * extent[0] + y * extent[1] + z * extent[2];
         test = size > test ? size : test;
     }
     return HALF_ULP * (POSITION_ULPS * bound + TEST_ULPS * test);
 }
 
-static void shading_normal(__global const Object *object, __global const float *normals, uint face,
+INLINE void shading_normal(__global const Object *object, __global const float *normals, uint face,
                            const float *weight, const float *geometric, float *result) {
     float interpolated[3] = {0.0f, 0.0f, 0.0f}, largest = 0.0f;
     if (object->first_normal != NO_INDEX) {
         __global const float *corner = normals + object->first_normal + 9 * (size_t)face;
         for (uint i = 0; i < 3; i++) {
             interpolated[i] = weight[0] * corner[i] + weight[1] * corner[3 + i] + weight[2] * corner[6 + i];
-            largest += bvh_abs(interpolated[i]);
+            largest += FABS(interpolated[i]);
         }
     }
     if (largest < 1e-6f) { // flat, or normals that cancel out
