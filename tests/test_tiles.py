@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from incpt.layout import SlotFlag
 from incpt.tiles import Cursor, Queue, TileGrid, base_queue, is_done, plan, spiral_queue
 
-grids = st.builds(TileGrid, st.integers(1, 200), st.integers(1, 200), st.integers(1, 40))
-near_points = st.tuples(st.floats(-300, 500), st.floats(-300, 500))
+grids = st.builds(TileGrid, st.integers(1, 120), st.integers(1, 120), st.integers(1, 40))
+near_points = st.tuples(st.floats(-100, 300), st.floats(-100, 300))
 any_points = st.tuples(st.floats(), st.floats())
 
 
