@@ -50,6 +50,7 @@ class Device:
 
     def __init__(self, choice: str | int | None = None) -> None:
         self.cl_device = choose(choice)
+        pocl.require_linker(self.cl_device)
         self.target = pocl.name_target(self.cl_device)
         try:
             self.context = cl.Context([self.cl_device])

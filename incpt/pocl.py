@@ -11,8 +11,11 @@ right level into the one place of PoCL's device structure that holds the name.
 from __future__ import annotations
 
 import ctypes
+import shutil
 from pathlib import Path
 from typing import Any
+
+from incpt.errors import DeviceError
 
 _UNKNOWN = b"generic\0"
 # The name stands about 640 bytes from the start; further on, stale copies of the pointer may lie about.
@@ -44,6 +47,16 @@ def name_target(cl_device: Any) -> str | None:
     _names_in_use.append(text)
     ctypes.c_void_p.from_address(places[0]).value = ctypes.addressof(text)
     return name
+
+
+def require_linker(cl_device: Any) -> None:
+    """Raises DeviceError where PoCL 3 could build no kernel: it links each with the system's `ld`, and
+    aborts the process without one."""
+    if "pocl 3." in cl_device.platform.version.lower() and shutil.which("ld") is None:
+        raise DeviceError(
+            "PoCL builds kernels with the system's linker `ld`, which is missing; install it "
+            "(Debian, Ubuntu: apt install gcc libc6-dev) or choose another --device"
+        )
 
 
 def target_name(flags: set[str]) -> str:

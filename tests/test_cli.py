@@ -20,6 +20,7 @@ import pytest
 from incpt import scene_io
 from incpt.cli import main
 from incpt.console import PathProgress, interruption, path_progress
+from incpt.device import all_devices
 from incpt.errors import DeviceError, OutputError
 from incpt.session import Session, StepReport
 
@@ -260,6 +261,16 @@ def test_devices_lists_and_tries(capsys: pytest.CaptureFixture[str]) -> None:
     out = capsys.readouterr().out
     assert out.count("taken") == 1
     assert "the kernels build and run" in out
+
+
+def test_a_linker_that_is_not_there(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    if not any("PoCL 3." in one.platform.version for one in all_devices()[:1]):
+        pytest.skip("only PoCL 3 asks for it")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert run("devices", "--test") == 1
+    assert "apt install gcc libc6-dev" in only_line(capsys.readouterr().err)
 
 
 def test_check_tells_what_is_in_a_scene(scene_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
