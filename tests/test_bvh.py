@@ -115,7 +115,7 @@ class World:
         shadows[ShadowPlane.ORIGIN_X : ShadowPlane.ORIGIN_Z + 1] = origins.T
         shadows[ShadowPlane.DIRECTION_X : ShadowPlane.DIRECTION_Z + 1] = directions.T
         shadows[ShadowPlane.DISTANCE] = distance
-        shadows[ShadowPlane.RADIANCE_R :] = np.array([[1], [2], [3]])
+        shadows[ShadowPlane.RADIANCE_R : ShadowPlane.RADIANCE_B + 1] = np.array([[1], [2], [3]])
         paths = np.zeros((len(PathPlane), count), np.float32)
         paths[PathPlane.MEDIUM_0].view(np.uint32)[:] = medium
         radiance = np.zeros((3, count), np.float32)
