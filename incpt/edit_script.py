@@ -118,7 +118,7 @@ def load_edits(path: str | os.PathLike[str], scene: Scene) -> EditScript:
         for number, table in enumerate(edits, 1):
             with in_place(f"[[edits]] {number}{_label_of(table)}"):
                 edit = _edit(table, number, capture, library)
-                if parsed and edit.step < parsed[-1].step:
+                if cumulative and parsed and edit.step < parsed[-1].step:
                     raise InputError(
                         f"step: {edit.step} comes before that of the last edit; order them by step"
                     )

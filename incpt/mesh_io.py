@@ -259,10 +259,10 @@ def _load_obj(path: Path) -> tuple[trimesh.Scene, int]:
     trimesh counts relative indices from the end of the file and fails altogether on one out of range:
     such files are rewritten for it.
     """
-    content = read_bytes(path)
+    content = _utf8(read_bytes(path))
     if not _ODD_OBJ_FACE.search(content):
         try:
-            return _load(path, "obj"), 0
+            return _load(path, "obj", content), 0
         except InputError:
             pass
     try:
@@ -270,6 +270,15 @@ def _load_obj(path: Path) -> tuple[trimesh.Scene, int]:
     except ValueError as error:
         raise InputError(f"is no OBJ mesh, or a damaged one ({_hint(error)})") from None
     return _load(path, "obj", content), left_out
+
+
+def _utf8(content: bytes) -> bytes:
+    """Text of older programs is Latin-1, for which trimesh would need another library."""
+    try:
+        content.decode()
+    except UnicodeDecodeError:
+        return content.decode("latin-1").encode()
+    return content
 
 
 def _absolute_obj(content: bytes) -> tuple[bytes, int]:
@@ -346,8 +355,10 @@ def _placed_mesh(
     geometry: trimesh.Trimesh, matrix: npt.NDArray[np.float64], counts: dict[str, int], with_normals: bool
 ) -> Mesh | None:
     """The geometry in the space of the file, without its unusable faces, which are added to `counts`."""
-    vertices = np.asarray(geometry.vertices, np.float64).reshape(-1, 3)
-    faces = np.asarray(geometry.faces, np.int64).reshape(-1, 3)
+    vertices = np.asarray(geometry.vertices, np.float64)
+    faces = np.asarray(geometry.faces, np.int64)
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
+        raise InputError("has vertices without three coordinates; the file is damaged")
     normals: npt.NDArray[np.float64] | None = None
     # Normals stand in the cache only where the loader put them; the property makes them up.
     if with_normals and "vertex_normals" in geometry._cache:

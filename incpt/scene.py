@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cache, cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -208,7 +208,9 @@ class Object:
         for name in ("position", "rotation", "scale"):
             _set_vector(self, name)
         if min(abs(s) for s in self.scale) < SMALLEST_SCALE:
-            raise InputError(f"scale: {list(self.scale)} flattens the object; use at least {SMALLEST_SCALE:g}")
+            raise InputError(
+                f"scale: {list(self.scale)} flattens the object; use at least {SMALLEST_SCALE:g}"
+            )
 
     @cached_property
     def world_from_object(self) -> npt.NDArray[np.float64]:
@@ -273,29 +275,31 @@ class Scene:
         """A scene whose environment has other values: color, image, rotation_y, intensity."""
         return replace(self, environment=_replace(self.environment, changes))
 
-    def with_material(self, name: str, **changes: Any) -> Scene:
+    def with_material(self, name: str, /, **changes: Any) -> Scene:
         """A scene with a changed material, or with a new one of that name."""
         material = _replace(self.materials.get(name, Material()), changes)
         return replace(self, materials={**self.materials, name: material})
 
-    def with_object(self, name: str, **changes: Any) -> Scene:
+    def with_object(self, name: str, /, **changes: Any) -> Scene:
         """A scene with one object changed: mesh, material, position, rotation, scale, visible, name."""
         changed = _replace(self.object(name), changes)
-        return replace(self, objects=[changed if o.name == name else o for o in self.objects])
+        return replace(self, objects=tuple(changed if o.name == name else o for o in self.objects))
 
     def with_added(self, *objects: Object) -> Scene:
         """A scene with more objects."""
-        return replace(self, objects=[*self.objects, *objects])
+        return replace(self, objects=(*self.objects, *objects))
 
     def without_object(self, name: str) -> Scene:
         """A scene without that object."""
         self.object(name)
-        return replace(self, objects=[o for o in self.objects if o.name != name])
+        return replace(self, objects=tuple(o for o in self.objects if o.name != name))
 
     def __getstate__(self) -> dict[str, Any]:
         # A mappingproxy cannot be pickled or deep-copied.
-        return {**{k: v for k, v in self.__dict__.items() if k != "object_index"},
-                "materials": dict(self.materials)}
+        return {
+            **{k: v for k, v in self.__dict__.items() if k != "object_index"},
+            "materials": dict(self.materials),
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state, materials=MappingProxyType(state["materials"]))
@@ -365,7 +369,9 @@ def diff(old: Scene, new: Scene) -> Change:
             for name, a, b in pairs
             if (a.position, a.rotation, a.scale, a.visible) != (b.position, b.rotation, b.scale, b.visible)
         ),
-        deformed=frozenset(name for name, a, b in pairs if a.mesh is not b.mesh and is_deformation(a.mesh, b.mesh)),
+        deformed=frozenset(
+            name for name, a, b in pairs if a.mesh is not b.mesh and is_deformation(a.mesh, b.mesh)
+        ),
         reshaped=frozenset(
             name for name, a, b in pairs if a.mesh is not b.mesh and not is_deformation(a.mesh, b.mesh)
         ),
@@ -382,7 +388,7 @@ def is_deformation(old: Mesh, new: Mesh) -> bool:
 SHAPES = ("cube", "sphere", "plane", "cylinder")
 
 
-@lru_cache(maxsize=None)
+@cache
 def shape(name: str) -> Mesh:
     """A built-in mesh: cube ([-0.5, 0.5]^3), sphere (radius 0.5), plane (1 x 1, facing +y), cylinder
     (radius 0.5, height 1, along y). Sphere and cylinder carry shading normals. Raises InputError."""
@@ -432,7 +438,9 @@ def _number(name: str, value: Any, low: float, high: float) -> float:
     try:
         number = float(value)
     except OverflowError:
-        raise InputError(f"{name}: a whole number that large is out of range; use {low:g} to {high:g}") from None
+        raise InputError(
+            f"{name}: a whole number that large is out of range; use {low:g} to {high:g}"
+        ) from None
     if not math.isfinite(number):
         raise InputError(f"{name}: {number} is not a finite number")
     if not low <= number <= high:

@@ -50,7 +50,8 @@ def apply_affine(matrix: Array, points: npt.NDArray[np.floating]) -> Array:
 def box_corners(bounds: npt.NDArray[np.floating]) -> Array:
     """(8, 3) corners of a box given as (2, 3): least and greatest coordinates."""
     choose = np.array([[(i >> axis) & 1 for axis in range(3)] for i in range(8)])
-    return np.asarray(bounds, np.float64)[choose, np.arange(3)]
+    corners: Array = np.asarray(bounds, np.float64)[choose, np.arange(3)]
+    return corners
 
 
 def camera_frame(

@@ -238,6 +238,12 @@ def test_obj_with_relative_and_impossible_indices(tmp_path: Path) -> None:
     assert (corners[1] == [[0, 0, 1], [1, 0, 1], [0, 1, 1]]).all()
 
 
+def test_an_obj_of_an_older_program(tmp_path: Path) -> None:
+    path = tmp_path / "l.obj"
+    path.write_bytes("# Größe in m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".encode("latin-1"))
+    assert len(mesh_io.load_mesh(path).faces) == 1
+
+
 def test_a_polygon_becomes_a_fan(tmp_path: Path) -> None:
     path = tmp_path / "p.obj"
     path.write_text("v 0 0 0\nv 1 0 0\nv 2 1 0\nv 1 2 0\nv 0 2 0\nf 1 2 3 4 5\n")
@@ -253,6 +259,7 @@ def test_a_polygon_becomes_a_fan(tmp_path: Path) -> None:
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 1 2\n", "no usable face .1 with zero area"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "no usable face .1 with an index out of range"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf a b c\n", "is no OBJ mesh"),
+        ("a.obj", b"v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "has vertices without three coordinates"),
         ("a.obj", b"v zero one two\nf 1 2 3\n", "is no OBJ mesh"),
         ("a.stl", b"solid garbage\nthis is no mesh\n", "is no STL mesh|no usable face"),
         ("a.stl", bytes(84), "is no STL mesh|no usable face"),
