@@ -13,7 +13,7 @@ typedef struct {
 } Boundary;
 
 // Unpolarised Fresnel reflectance; cosine > 0 on the side of incidence. 1 under total internal reflection.
-static inline float fresnel_dielectric(float cosine, float eta) {
+INLINE float fresnel_dielectric(float cosine, float eta) {
     float sin2_t = (1.0f - cosine * cosine) / (eta * eta);
     if (sin2_t >= 1.0f)
         return 1.0f;
@@ -23,14 +23,14 @@ static inline float fresnel_dielectric(float cosine, float eta) {
     return 0.5f * (parallel * parallel + perpendicular * perpendicular);
 }
 
-static inline float boundary_reflectance(const Boundary *b, float cosine) {
+INLINE float boundary_reflectance(const Boundary *b, float cosine) {
     float f = fresnel_dielectric(cosine, b->eta);
     return f < 1.0f ? f * b->specular : 1.0f;
 }
 
 // The direction behind the boundary of light that comes along wo, for a microfacet normal h with
 // <wo, h> > 0; call it only without total internal reflection.
-static inline Vec3 refracted(Vec3 wo, Vec3 h, float eta) {
+INLINE Vec3 refracted(Vec3 wo, Vec3 h, float eta) {
     float cosine = inner(wo, h);
     float cos_t = sqrt(max(1.0f - (1.0f - cosine * cosine) / (eta * eta), 0.0f));
     return add(scaled(-1.0f / eta, wo), scaled(cosine / eta - cos_t, h));
@@ -38,7 +38,7 @@ static inline Vec3 refracted(Vec3 wo, Vec3 h, float eta) {
 
 // GGX with height-correlated Smith masking; the cosine of wi is in f_cos, pdf is per solid angle and that of
 // sample_rough_boundary. Radiance is scaled by 1 / eta^2 on its way through, as it travels against the path.
-static inline BsdfValue eval_rough_boundary(const Boundary *b, Vec3 wo, Vec3 wi) {
+INLINE BsdfValue eval_rough_boundary(const Boundary *b, Vec3 wo, Vec3 wi) {
     BsdfValue result;
     result.f_cos = vec3(0.0f, 0.0f, 0.0f);
     result.pdf = 0.0f;
@@ -77,7 +77,7 @@ static inline BsdfValue eval_rough_boundary(const Boundary *b, Vec3 wo, Vec3 wi)
     return result;
 }
 
-static inline BsdfSample sample_rough_boundary(const Boundary *b, Vec3 wo, Uniform2 uv, float lobe) {
+INLINE BsdfSample sample_rough_boundary(const Boundary *b, Vec3 wo, Uniform2 uv, float lobe) {
     Vec3 h = sample_visible_normal(wo, b->alpha, uv.u, uv.v);
     float o_h = inner(wo, h);
     int reflects = lobe < boundary_reflectance(b, o_h);
@@ -92,7 +92,7 @@ static inline BsdfSample sample_rough_boundary(const Boundary *b, Vec3 wo, Unifo
     return result;
 }
 
-static inline BsdfSample sample_smooth_boundary(const Boundary *b, Vec3 wo, float lobe) {
+INLINE BsdfSample sample_smooth_boundary(const Boundary *b, Vec3 wo, float lobe) {
     int reflects = lobe < boundary_reflectance(b, wo.z);
     Vec3 normal = vec3(0.0f, 0.0f, 1.0f);
     BsdfSample result;

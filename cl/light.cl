@@ -5,8 +5,12 @@
 // (ENVIRONMENT_IMAGE, TRIANGLE_LIGHTS), so that a scene does not pay for what it has not.
 // A constant environment is left to BSDF sampling, which finds it without any variance of its own.
 
+#if defined(ENVIRONMENT_IMAGE) || defined(TRIANGLE_LIGHTS)
+#define LIGHT_SAMPLING
+#endif
+
 typedef struct {
-    __global const Light *lights;
+    __global const float *lights;      // planes of params.light_count triangles
     __global const float *image;       // environment, red, green, blue, row by row from +y
     __global const float *marginal;    // cumulative distribution of rows, height + 1
     __global const float *conditional; // of the pixels of each row, width + 1 each
@@ -22,7 +26,7 @@ typedef struct {
 
 // Place in the lat-long image, in [0, 1) x [0, 1], of a direction. OpenEXR: the centre looks to +z, three
 // quarters to the right is -x, the top row is +y; the rotation turns the image right-handed about +y.
-static inline Uniform2 environment_place(const Params *params, Vec3 direction) {
+INLINE Uniform2 environment_place(const Params *params, Vec3 direction) {
     Uniform2 place;
     float u = 0.5f + atan2_turns(-direction.x, direction.z) + params->environment_rotation;
     place.u = u - FLOOR(u);
@@ -30,7 +34,7 @@ static inline Uniform2 environment_place(const Params *params, Vec3 direction) {
     return place;
 }
 
-static inline Vec3 environment_direction(const Params *params, Uniform2 place) {
+INLINE Vec3 environment_direction(const Params *params, Uniform2 place) {
     float longitude = place.u - 0.5f - params->environment_rotation;
     float sine, cosine, sin_polar, cos_polar;
     sincos_turns(longitude - FLOOR(longitude), &sine, &cosine);
@@ -39,7 +43,7 @@ static inline Vec3 environment_direction(const Params *params, Uniform2 place) {
 }
 
 // Radiance of the image at a place, bilinear between texel centres; columns wrap round, rows end.
-static inline Vec3 image_radiance(const Params *params, const Emitters *emitters, Uniform2 place) {
+INLINE Vec3 image_radiance(const Params *params, const Emitters *emitters, Uniform2 place) {
     uint width = params->environment_width, height = params->environment_height;
     float x = place.u * (float)width - 0.5f;
     float y = CLAMP(place.v * (float)height - 0.5f, 0.0f, (float)(height - 1u));
@@ -59,7 +63,7 @@ static inline Vec3 image_radiance(const Params *params, const Emitters *emitters
                 LERP(LERP(p00[2], p10[2], tx), LERP(p01[2], p11[2], tx), ty));
 }
 
-static inline float environment_pdf(const Params *params, const Emitters *emitters, Uniform2 place) {
+INLINE float environment_pdf(const Params *params, const Emitters *emitters, Uniform2 place) {
     uint width = params->environment_width, height = params->environment_height;
     uint column = MIN((uint)(place.u * (float)width), width - 1u);
     uint row = MIN((uint)(place.v * (float)height), height - 1u);
@@ -72,7 +76,7 @@ static inline float environment_pdf(const Params *params, const Emitters *emitte
 
 // Radiance that arrives from far away along -direction, and the density with which light sampling would
 // have chosen the direction (0: never).
-static inline Vec3 eval_environment(const Params *params, const Emitters *emitters, Vec3 direction,
+INLINE Vec3 eval_environment(const Params *params, const Emitters *emitters, Vec3 direction,
                                     float *pdf) {
     Vec3 color =
         vec3(params->environment_color[0], params->environment_color[1], params->environment_color[2]);
@@ -87,7 +91,7 @@ static inline Vec3 eval_environment(const Params *params, const Emitters *emitte
 }
 
 #ifdef ENVIRONMENT_IMAGE
-static inline LightSample sample_environment(const Params *params, const Emitters *emitters, Uniform2 uv) {
+INLINE LightSample sample_environment(const Params *params, const Emitters *emitters, Uniform2 uv) {
     uint width = params->environment_width, height = params->environment_height;
     uint row = find_cell(emitters->marginal, height, uv.v);
     float low = emitters->marginal[row], high = emitters->marginal[row + 1u];
@@ -108,17 +112,20 @@ static inline LightSample sample_environment(const Params *params, const Emitter
 
 #ifdef TRIANGLE_LIGHTS
 // `choice` picks the triangle (Walker's alias method), `uv` the point on it.
-static inline LightSample sample_triangle_light(const Params *params, const Emitters *emitters, Vec3 position,
+INLINE LightSample sample_triangle_light(const Params *params, const Emitters *emitters, Vec3 position,
                                                 Uniform2 uv, float choice) {
-    float scaled_choice = choice * (float)params->light_count;
-    uint cell = MIN((uint)scaled_choice, params->light_count - 1u);
-    __global const Light *first = &emitters->lights[cell];
-    uint index = scaled_choice - (float)cell < first->alias_probability ? cell : first->alias;
-    __global const Light *light = &emitters->lights[index];
+    uint stride = params->light_count;
+    __global const float *lights = emitters->lights;
+    float scaled_choice = choice * (float)stride;
+    uint cell = MIN((uint)scaled_choice, stride - 1u);
+    uint alias = ((__global const uint *)lights)[LIGHT_ALIAS * stride + cell];
+    uint light = scaled_choice - (float)cell < lights[LIGHT_ALIAS_PROBABILITY * stride + cell] ? cell : alias;
     float b1, b2;
     sample_triangle(uv.u, uv.v, &b1, &b2);
-    Vec3 edge_1 = material_vec3(light->edge_1), edge_2 = material_vec3(light->edge_2);
-    Vec3 point = add(material_vec3(light->vertex), add(scaled(b1, edge_1), scaled(b2, edge_2)));
+    Vec3 vertex = load3(lights + LIGHT_VERTEX_X * stride, stride, light);
+    Vec3 edge_1 = load3(lights + LIGHT_EDGE_1_X * stride, stride, light);
+    Vec3 edge_2 = load3(lights + LIGHT_EDGE_2_X * stride, stride, light);
+    Vec3 point = add(vertex, add(scaled(b1, edge_1), scaled(b2, edge_2)));
     Vec3 normal = unit(outer(edge_1, edge_2));
     Vec3 to_light = subtract(point, position);
     float squared = inner(to_light, to_light);
@@ -126,17 +133,19 @@ static inline LightSample sample_triangle_light(const Params *params, const Emit
     result.distance = SQRT(squared);
     result.direction = scaled(1.0f / MAX(result.distance, 1e-30f), to_light);
     float cosine = -inner(normal, result.direction);
-    int shines = (light->double_sided != 0u) | (cosine > 0.0f);
+    int double_sided = ((__global const uint *)lights)[LIGHT_DOUBLE_SIDED * stride + light] != 0u;
+    int shines = double_sided | (cosine > 0.0f);
     float facing = FABS(cosine);
     int valid = shines & (facing > 1e-7f) & (squared > 0.0f);
-    result.radiance = material_vec3(light->emission);
-    result.pdf = valid ? light->pdf_area * squared / (valid ? facing : 1.0f) : 0.0f;
+    result.radiance = load3(lights + LIGHT_EMISSION_R * stride, stride, light);
+    result.pdf = valid ? lights[LIGHT_PDF_AREA * stride + light] * squared / (valid ? facing : 1.0f) : 0.0f;
     return result;
 }
 #endif
 
+#ifdef LIGHT_SAMPLING
 // One direction towards a light, chosen by power among triangles and the environment.
-static inline LightSample sample_light(const Params *params, const Emitters *emitters, Vec3 position,
+INLINE LightSample sample_light(const Params *params, const Emitters *emitters, Vec3 position,
                                        Uniform2 uv, float choice) {
 #if defined(ENVIRONMENT_IMAGE) && defined(TRIANGLE_LIGHTS)
     float p = params->environment_probability;
@@ -156,10 +165,11 @@ static inline LightSample sample_light(const Params *params, const Emitters *emi
     return sample_triangle_light(params, emitters, position, uv, choice);
 #endif
 }
+#endif
 
 // Radiance that a hit surface emits towards the ray's origin, weighted against light sampling, which would
 // have found the point with the material's area density. bsdf_pdf 0: nobody else could have found it.
-static inline Vec3 emitted_radiance(__global const Material *material, float facing, float distance,
+INLINE Vec3 emitted_radiance(__global const Material *material, float facing, float distance,
                                     float bsdf_pdf) {
     int shines = ((material->flags & MATERIAL_DOUBLE_SIDED) != 0u) | (facing > 0.0f);
     float light_pdf = material->light_pdf * distance * distance / MAX(FABS(facing), 1e-7f);

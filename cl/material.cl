@@ -33,9 +33,9 @@ typedef struct {
     float pdf;
 } BsdfSample;
 
-static inline Vec3 material_vec3(__global const float *v) { return vec3(v[0], v[1], v[2]); }
+INLINE Vec3 material_vec3(__global const float *v) { return vec3(v[0], v[1], v[2]); }
 
-static inline Surface surface_of(__global const Material *material, __global const float *layer) {
+INLINE Surface surface_of(__global const Material *material, __global const float *layer) {
     Surface s;
     Vec3 color = material_vec3(material->base_color);
     float metallic = material->metallic;
@@ -53,7 +53,7 @@ static inline Surface surface_of(__global const Material *material, __global con
     return s;
 }
 
-static inline float layer_albedo(const Surface *s, float cosine) {
+INLINE float layer_albedo(const Surface *s, float cosine) {
     float place = CLAMP(cosine, 0.0f, 1.0f) * (float)(ALBEDO_TABLE_SIZE - 1u);
     uint cell = MIN((uint)place, ALBEDO_TABLE_SIZE - 2u);
     float t = place - (float)cell;
@@ -62,7 +62,7 @@ static inline float layer_albedo(const Surface *s, float cosine) {
 
 // Chance of sampling the specular part: its share of the albedo for wo, kept away from 0 and 1 where both
 // parts exist, so that neither is starved where the estimate is off.
-static inline float specular_probability(const Surface *s, float layer_wo) {
+INLINE float specular_probability(const Surface *s, float layer_wo) {
     float specular = LERP(layer_wo, MAX(luminance(s->f0), 0.0f), s->metallic);
     float diffuse = luminance(s->base) * (1.0f - layer_wo);
     float share = specular / MAX(specular + diffuse, 1e-12f);
@@ -70,7 +70,7 @@ static inline float specular_probability(const Surface *s, float layer_wo) {
     return both ? CLAMP(share, 0.1f, 0.9f) : (diffuse > 0.0f ? 0.0f : 1.0f);
 }
 
-static inline BsdfValue eval_surface(const Surface *s, Vec3 wo, Vec3 wi) {
+INLINE BsdfValue eval_surface(const Surface *s, Vec3 wo, Vec3 wi) {
     float a2 = s->alpha * s->alpha;
     Vec3 h = unit(add(wo, wi));
     float slope = (h.x * h.x + h.y * h.y) / a2 + h.z * h.z;
@@ -95,7 +95,7 @@ static inline BsdfValue eval_surface(const Surface *s, Vec3 wo, Vec3 wi) {
     return result;
 }
 
-static inline BsdfSample sample_surface(const Surface *s, Vec3 wo, Uniform2 direction, float lobe) {
+INLINE BsdfSample sample_surface(const Surface *s, Vec3 wo, Uniform2 direction, float lobe) {
     int specular = lobe < specular_probability(s, layer_albedo(s, wo.z));
     Vec3 h = sample_visible_normal(wo, s->alpha, direction.u, direction.v);
     Vec3 reflected = subtract(scaled(2.0f * inner(wo, h), h), wo);

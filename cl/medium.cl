@@ -8,7 +8,7 @@ typedef struct {
     uint entry[MEDIUM_STACK_SIZE];
 } MediumStack;
 
-static inline MediumStack load_medium_stack(__global const uint *path_bits, uint stride, uint path) {
+INLINE MediumStack load_medium_stack(__global const uint *path_bits, uint stride, uint path) {
     uint low = path_bits[PATH_MEDIUM_0 * stride + path];
     uint high = path_bits[PATH_MEDIUM_1 * stride + path];
     MediumStack stack;
@@ -19,20 +19,20 @@ static inline MediumStack load_medium_stack(__global const uint *path_bits, uint
     return stack;
 }
 
-static inline void store_medium_stack(__global uint *path_bits, uint stride, uint path,
+INLINE void store_medium_stack(__global uint *path_bits, uint stride, uint path,
                                       const MediumStack *stack) {
     path_bits[PATH_MEDIUM_0 * stride + path] = stack->entry[0] | (stack->entry[1] << 16);
     path_bits[PATH_MEDIUM_1 * stride + path] = stack->entry[2] | (stack->entry[3] << 16);
 }
 
 // The higher wins; 0 is the highest of all.
-static inline uint effective_priority(__global const Material *materials, uint material) {
+INLINE uint effective_priority(__global const Material *materials, uint material) {
     uint priority = materials[material].priority;
     return priority == 0u ? 0xffffffffu : priority;
 }
 
 // Puts a medium above all that do not win over it. The lowest entry of a full stack is forgotten.
-static inline void enter_medium(MediumStack *stack, __global const Material *materials, uint material) {
+INLINE void enter_medium(MediumStack *stack, __global const Material *materials, uint material) {
     uint priority = effective_priority(materials, material);
     uint carried = material;
     int placed = 0;
@@ -47,7 +47,7 @@ static inline void enter_medium(MediumStack *stack, __global const Material *mat
 }
 
 // Takes the first entry of that medium out; returns whether there was one.
-static inline int leave_medium(MediumStack *stack, uint material) {
+INLINE int leave_medium(MediumStack *stack, uint material) {
     int found = 0;
     for (uint i = 0u; i < MEDIUM_STACK_SIZE; i++) {
         found |= stack->entry[i] == material;
@@ -57,6 +57,6 @@ static inline int leave_medium(MediumStack *stack, uint material) {
     return found;
 }
 
-static inline float medium_ior(__global const Material *materials, uint medium) {
+INLINE float medium_ior(__global const Material *materials, uint medium) {
     return medium == MEDIUM_NONE ? 1.0f : materials[medium].ior;
 }

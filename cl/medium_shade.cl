@@ -4,11 +4,7 @@
 // boundary of nested dielectrics. A path that turns out to stand on an opaque surface is passed on to
 // `shade` by its class. Rarer and full of branches, so it stands apart from `shade` and is not vectorised.
 __kernel void medium_shade(const Params params, const uint count, __global const uint *list,
-                           __global const Material *materials, __global const Light *lights,
-                           __global const float *environment_image,
-                           __global const float *environment_marginal,
-                           __global const float *environment_conditional,
-                           __global const float *environment_pdf, __global const float *hits,
+                           __global const Material *materials, __global const float *hits,
                            __global float *rays, __global float *paths, __global float *shadows,
                            __global float *radiance) {
     uint stride = params.path_stride;
@@ -18,13 +14,6 @@ __kernel void medium_shade(const Params params, const uint count, __global const
     uint path = list[item];
     uint result = params.first_path + path;
     __global uint *bits = (__global uint *)paths;
-    Emitters emitters;
-    emitters.lights = lights;
-    emitters.image = environment_image;
-    emitters.marginal = environment_marginal;
-    emitters.conditional = environment_conditional;
-    emitters.texel_pdf = environment_pdf;
-
     uint hit_material = ((__global const uint *)hits)[HIT_MATERIAL * stride + path];
     __global const Material *material = &materials[hit_material];
     Vec3 direction = load3(rays + RAY_DIRECTION_X * stride, stride, path);
@@ -90,20 +79,19 @@ __kernel void medium_shade(const Params params, const uint count, __global const
     uint path_class = 0u;
 
     // Light sampling, where a rough boundary has a density for it.
-#if defined(ENVIRONMENT_IMAGE) || defined(TRIANGLE_LIGHTS)
+#ifdef LIGHT_SAMPLING
     if (!covered && !smooth && bounces <= params.max_bounces) {
-        LightSample light =
-            sample_light(&params, &emitters, position, uniform_2d(seed, sample, PAIR_LIGHT(ray)), choices.v);
-        Vec3 wi = to_local(frame, light.direction);
+        Vec3 to_light = load3(shadows + SHADOW_DIRECTION_X * stride, stride, path);
+        float light_pdf = shadows[SHADOW_PDF * stride + path];
+        Vec3 wi = to_local(frame, to_light);
         BsdfValue value = eval_rough_boundary(&boundary, wo, wi);
-        float above = inner(geometric, light.direction);
-        if (light.pdf > 0.0f && value.pdf > 0.0f && above * wi.z > 0.0f) {
-            float weight = mis_weight(light.pdf, value.pdf) / light.pdf;
-            Vec3 arriving = times(times(throughput, value.f_cos), scaled(weight, light.radiance));
+        float above = inner(geometric, to_light);
+        if (light_pdf > 0.0f && value.pdf > 0.0f && above * wi.z > 0.0f) {
+            Vec3 arriving = load3(shadows + SHADOW_RADIANCE_R * stride, stride, path);
+            float weight = mis_weight(light_pdf, value.pdf) / light_pdf;
+            arriving = times(times(throughput, value.f_cos), scaled(weight, arriving));
             store3(shadows + SHADOW_ORIGIN_X * stride, stride, path,
                    along(position, above > 0.0f ? offset : -offset, geometric));
-            store3(shadows + SHADOW_DIRECTION_X * stride, stride, path, light.direction);
-            shadows[SHADOW_DISTANCE * stride + path] = light.distance * 0.9999f - offset;
             store3(shadows + SHADOW_RADIANCE_R * stride, stride, path, arriving);
             path_class |= CLASS_SHADOW;
         }

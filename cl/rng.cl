@@ -16,7 +16,7 @@ typedef struct {
     float u, v;
 } Uniform2;
 
-static inline uint hash(uint x) {
+INLINE uint hash(uint x) {
     // C. Wellons, "lowbias32": bias 0.17, the best known two-round multiply-xorshift.
     x = (x ^ (x >> 16)) * 0x7feb352du;
     x = (x ^ (x >> 15)) * 0x846ca68bu;
@@ -25,7 +25,7 @@ static inline uint hash(uint x) {
 
 // Owen scrambling of a number whose bits are reversed: every bit is flipped depending on the lower ones.
 // Laine-Karras permutation with N. Vegdahl's constants.
-static inline uint scramble_reversed(uint x, uint seed) {
+INLINE uint scramble_reversed(uint x, uint seed) {
     x ^= x * 0x3d20adeau;
     x += seed;
     x *= (seed >> 16) | 1u;
@@ -35,7 +35,7 @@ static inline uint scramble_reversed(uint x, uint seed) {
 
 // Second dimension of Sobol's sequence, its bits reversed: the Pascal matrix modulo 2, which is the sum
 // over supersets of bit indices and so takes log2(32) steps.
-static inline uint sobol_second_reversed(uint index) {
+INLINE uint sobol_second_reversed(uint index) {
     index ^= index >> 16;
     index ^= (index & 0xff00ff00u) >> 8;
     index ^= (index & 0xf0f0f0f0u) >> 4;
@@ -44,13 +44,13 @@ static inline uint sobol_second_reversed(uint index) {
 }
 
 // [0, 1): 24 bits, which a float holds exactly.
-static inline float to_uniform(uint x) { return (float)(x >> 8) * 0x1p-24f; }
+INLINE float to_uniform(uint x) { return (float)(x >> 8) * 0x1p-24f; }
 
 // What all dimensions of a pixel share.
-static inline uint pixel_seed(uint pixel, uint seed) { return hash(pixel ^ hash(seed + 0x9e3779b9u)); }
+INLINE uint pixel_seed(uint pixel, uint seed) { return hash(pixel ^ hash(seed + 0x9e3779b9u)); }
 
 // Two uniform numbers for a pair of dimensions of a sample.
-static inline Uniform2 uniform_2d(uint pixel_seed, uint sample, uint pair) {
+INLINE Uniform2 uniform_2d(uint pixel_seed, uint sample, uint pair) {
     uint seed = hash(pixel_seed + pair * 0x9e3779b9u);
     uint index = REVERSE_BITS(scramble_reversed(REVERSE_BITS(sample), seed));
     Uniform2 result;

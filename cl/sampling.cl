@@ -7,7 +7,7 @@ typedef struct {
 } Frame;
 
 // T. Duff et al., Building an Orthonormal Basis, Revisited, JCGT 6(1), 2017.
-static inline Frame frame_of(Vec3 n) {
+INLINE Frame frame_of(Vec3 n) {
     float sign = n.z >= 0.0f ? 1.0f : -1.0f;
     float a = -1.0f / (sign + n.z);
     float b = n.x * n.y * a;
@@ -18,16 +18,16 @@ static inline Frame frame_of(Vec3 n) {
     return frame;
 }
 
-static inline Vec3 to_local(Frame f, Vec3 v) {
+INLINE Vec3 to_local(Frame f, Vec3 v) {
     return vec3(inner(v, f.tangent), inner(v, f.bitangent), inner(v, f.normal));
 }
 
-static inline Vec3 from_local(Frame f, Vec3 v) {
+INLINE Vec3 from_local(Frame f, Vec3 v) {
     return add(add(scaled(v.x, f.tangent), scaled(v.y, f.bitangent)), scaled(v.z, f.normal));
 }
 
 // Density cos / pi per solid angle.
-static inline Vec3 sample_cosine_hemisphere(float u, float v) {
+INLINE Vec3 sample_cosine_hemisphere(float u, float v) {
     float sine, cosine;
     sincos_turns(v, &sine, &cosine);
     float radius = SQRT(u);
@@ -36,7 +36,7 @@ static inline Vec3 sample_cosine_hemisphere(float u, float v) {
 
 // A microfacet normal that is visible from wo (wo.z > 0) on a GGX surface, density G1(wo) D(h) <wo, h> / wo.z.
 // J. Dupuy and A. Benyoub, Sampling Visible GGX Normals with Spherical Caps, HPG 2023.
-static inline Vec3 sample_visible_normal(Vec3 wo, float alpha, float u, float v) {
+INLINE Vec3 sample_visible_normal(Vec3 wo, float alpha, float u, float v) {
     Vec3 stretched = unit(vec3(alpha * wo.x, alpha * wo.y, wo.z));
     float sine, cosine;
     sincos_turns(u, &sine, &cosine);
@@ -47,16 +47,15 @@ static inline Vec3 sample_visible_normal(Vec3 wo, float alpha, float u, float v)
 }
 
 // Barycentric coordinates of a point that is uniform on a triangle, for its second and third vertex.
-// E. Heitz, A Low-Distortion Map Between Triangle and Square, 2019.
-static inline void sample_triangle(float u, float v, float *b1, float *b2) {
-    float shift = 0.5f * MIN(u, v);
-    *b1 = u > v ? u - shift : shift;
-    *b2 = u > v ? shift : v - shift;
+INLINE void sample_triangle(float u, float v, float *b1, float *b2) {
+    float root = SQRT(u);
+    *b1 = 1.0f - root;
+    *b2 = v * root;
 }
 
 // Index of the cell of a cumulative table cdf[0 .. count] (0 first, 1 last) in which u lies. The number of
 // steps is fixed, so that all lanes take the same way.
-static inline uint find_cell(__global const float *cdf, uint count, float u) {
+INLINE uint find_cell(__global const float *cdf, uint count, float u) {
     uint low = 0, high = count;
 #pragma unroll
     for (uint step = 0; step < ENVIRONMENT_SEARCH_STEPS; step++) {
@@ -69,13 +68,13 @@ static inline uint find_cell(__global const float *cdf, uint count, float u) {
 }
 
 // Power heuristic of two techniques (Veach and Guibas 1995), one sample each.
-static inline float mis_weight(float pdf, float other_pdf) {
+INLINE float mis_weight(float pdf, float other_pdf) {
     float ratio = other_pdf / pdf;
     return 1.0f / (1.0f + ratio * ratio);
 }
 
 // Chance that Russian roulette lets a path go on after `bounces` scattering events.
-static inline float survival_probability(Vec3 throughput, uint bounces, uint roulette_depth) {
+INLINE float survival_probability(Vec3 throughput, uint bounces, uint roulette_depth) {
     float share = CLAMP(largest(throughput), 0.05f, 1.0f);
     return bounces >= roulette_depth ? share : 1.0f;
 }

@@ -17,6 +17,9 @@
 #define REVERSE_BITS(x) reverse_bits(x)
 #endif
 
+// A call that stays a call is not vectorised over either, and LLVM leaves large functions as calls.
+#define INLINE static inline __attribute__((always_inline))
+
 #define PI 3.14159265358979f
 #define INV_PI 0.318309886183791f
 
@@ -30,7 +33,7 @@ typedef struct {
     float x, y, z;
 } Vec3;
 
-static inline Vec3 vec3(float x, float y, float z) {
+INLINE Vec3 vec3(float x, float y, float z) {
     Vec3 v;
     v.x = x;
     v.y = y;
@@ -38,32 +41,32 @@ static inline Vec3 vec3(float x, float y, float z) {
     return v;
 }
 
-static inline Vec3 add(Vec3 a, Vec3 b) { return vec3(a.x + b.x, a.y + b.y, a.z + b.z); }
-static inline Vec3 subtract(Vec3 a, Vec3 b) { return vec3(a.x - b.x, a.y - b.y, a.z - b.z); }
-static inline Vec3 times(Vec3 a, Vec3 b) { return vec3(a.x * b.x, a.y * b.y, a.z * b.z); }
-static inline Vec3 scaled(float s, Vec3 a) { return vec3(s * a.x, s * a.y, s * a.z); }
-static inline Vec3 along(Vec3 origin, float t, Vec3 direction) { return add(origin, scaled(t, direction)); }
-static inline Vec3 choose(int condition, Vec3 a, Vec3 b) {
+INLINE Vec3 add(Vec3 a, Vec3 b) { return vec3(a.x + b.x, a.y + b.y, a.z + b.z); }
+INLINE Vec3 subtract(Vec3 a, Vec3 b) { return vec3(a.x - b.x, a.y - b.y, a.z - b.z); }
+INLINE Vec3 times(Vec3 a, Vec3 b) { return vec3(a.x * b.x, a.y * b.y, a.z * b.z); }
+INLINE Vec3 scaled(float s, Vec3 a) { return vec3(s * a.x, s * a.y, s * a.z); }
+INLINE Vec3 along(Vec3 origin, float t, Vec3 direction) { return add(origin, scaled(t, direction)); }
+INLINE Vec3 choose(int condition, Vec3 a, Vec3 b) {
     return vec3(condition ? a.x : b.x, condition ? a.y : b.y, condition ? a.z : b.z);
 }
-static inline float inner(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-static inline Vec3 outer(Vec3 a, Vec3 b) {
+INLINE float inner(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+INLINE Vec3 outer(Vec3 a, Vec3 b) {
     return vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
 }
-static inline Vec3 unit(Vec3 a) { return scaled(1.0f / SQRT(inner(a, a)), a); }
-static inline float largest(Vec3 a) { return MAX(MAX(a.x, a.y), a.z); }
-static inline float luminance(Vec3 c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
+INLINE Vec3 unit(Vec3 a) { return scaled(1.0f / SQRT(inner(a, a)), a); }
+INLINE float largest(Vec3 a) { return MAX(MAX(a.x, a.y), a.z); }
+INLINE float luminance(Vec3 c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
 
-static inline Vec3 load3(__global const float *plane, uint stride, uint i) {
+INLINE Vec3 load3(__global const float *plane, uint stride, uint i) {
     return vec3(plane[i], plane[stride + i], plane[2 * stride + i]);
 }
-static inline void store3(__global float *plane, uint stride, uint i, Vec3 v) {
+INLINE void store3(__global float *plane, uint stride, uint i, Vec3 v) {
     plane[i] = v.x;
     plane[stride + i] = v.y;
     plane[2 * stride + i] = v.z;
 }
 
-static inline uint reverse_bits(uint x) {
+INLINE uint reverse_bits(uint x) {
     x = (x << 16) | (x >> 16);
     x = ((x & 0x00ff00ffu) << 8) | ((x & 0xff00ff00u) >> 8);
     x = ((x & 0x0f0f0f0fu) << 4) | ((x & 0xf0f0f0f0u) >> 4);
@@ -73,7 +76,7 @@ static inline uint reverse_bits(uint x) {
 
 // Sine and cosine of an angle in turns, 0 <= turns <= 1; absolute error below 2e-7. The angle is reduced
 // to an eighth of a turn on either side of a quarter; the Taylor series is exact to float there.
-static inline void sincos_turns(float turns, float *sine, float *cosine) {
+INLINE void sincos_turns(float turns, float *sine, float *cosine) {
     float quarter = FLOOR(4.0f * turns + 0.5f);
     float x = (turns - 0.25f * quarter) * (2.0f * PI);
     float x2 = x * x;
@@ -87,7 +90,7 @@ static inline void sincos_turns(float turns, float *sine, float *cosine) {
 }
 
 // atan2(y, x) in turns, in [-0.5, 0.5]; absolute error below 1e-6. 0 where both are 0.
-static inline float atan2_turns(float y, float x) {
+INLINE float atan2_turns(float y, float x) {
     float ax = FABS(x), ay = FABS(y);
     float high = MAX(ax, ay), low = MIN(ax, ay);
     float t = low / MAX(high, 1e-37f);

@@ -5,12 +5,12 @@
 //
 //   L_o(wo) = L_e(wo) + integral of f(wo, wi) L_i(wi) cos(wi) d wi
 //
-// with the integral estimated by light sampling (the shadow ray) and by BSDF sampling (the next ray, whose
+// with the integral estimated by light sampling (`illuminate` has chosen a light) and by BSDF sampling (the next ray, whose
 // emission counts at its end), combined by multiple importance sampling. Straight-line code of scalars, so
 // that PoCL runs it in SIMD lanes.
 __kernel void shade(const Params params, const uint count, __global const uint *list,
                     __global const Material *materials, __global const float *layers,
-                    __global const Light *lights, __global const float *environment_image,
+                    __global const float *lights, __global const float *environment_image,
                     __global const float *environment_marginal,
                     __global const float *environment_conditional,
                     __global const float *environment_pdf, __global const float *hits, __global float *rays,
@@ -73,21 +73,18 @@ __kernel void shade(const Params params, const uint count, __global const uint *
     uint path_class = 0u;
 
     // Light sampling: a shadow ray, if the light's side of the surface is the ray's side.
-#if defined(ENVIRONMENT_IMAGE) || defined(TRIANGLE_LIGHTS)
-    LightSample light =
-        sample_light(&params, &emitters, origin, uniform_2d(seed, sample, PAIR_LIGHT(ray)), choices.v);
-    BsdfValue towards_light = eval_surface(&surface, wo, to_local(frame, light.direction));
-    int lit = scatters & (light.pdf > 0.0f) & (towards_light.pdf > 0.0f) &
-              (inner(geometric, light.direction) > 0.0f);
-    float light_weight = lit ? mis_weight(lit ? light.pdf : 1.0f, towards_light.pdf) / (lit ? light.pdf : 1.0f) : 0.0f;
-    Vec3 arriving = times(times(throughput, towards_light.f_cos), scaled(light_weight, light.radiance));
-    lit = lit & (largest(arriving) > 0.0f);
+#ifdef LIGHT_SAMPLING
+    Vec3 to_light = load3(shadows + SHADOW_DIRECTION_X * stride, stride, path);
+    float light_pdf = shadows[SHADOW_PDF * stride + path];
+    BsdfValue towards_light = eval_surface(&surface, wo, to_local(frame, to_light));
+    int lit = scatters & (light_pdf > 0.0f) & (towards_light.pdf > 0.0f) & (inner(geometric, to_light) > 0.0f);
+    light_pdf = lit ? light_pdf : 1.0f;
+    float light_weight = mis_weight(light_pdf, towards_light.pdf) / light_pdf;
+    Vec3 arriving = load3(shadows + SHADOW_RADIANCE_R * stride, stride, path);
+    arriving = times(times(throughput, towards_light.f_cos), scaled(light_weight, arriving));
     store3(shadows + SHADOW_ORIGIN_X * stride, stride, path, origin);
-    store3(shadows + SHADOW_DIRECTION_X * stride, stride, path, light.direction);
-    // The light's own surface must not be in its way.
-    shadows[SHADOW_DISTANCE * stride + path] = light.distance * 0.9999f - offset;
     store3(shadows + SHADOW_RADIANCE_R * stride, stride, path, arriving);
-    path_class = lit ? CLASS_SHADOW : 0u;
+    path_class = lit & (largest(arriving) > 0.0f) ? CLASS_SHADOW : 0u;
 #endif
 
     // BSDF sampling: the next ray.

@@ -134,11 +134,11 @@ class DeviceScene:
         )
         share = 0.0 if not has_triangles else 0.5 if environment is not None else 1.0
         table = lights.triangle_lights(self.scene, share)
-        self.light_count = len(table.rows)
+        self.light_count = table.count
         if self.light_count == 0:
             share = 0.0
         self.environment_probability = 0.0 if environment is None else 1.0 - share
-        self._upload("lights", table.rows if self.light_count else np.zeros(1, layout.LIGHT))
+        self._upload("lights", table.planes)
         self.features = (("ENVIRONMENT_IMAGE",) if environment is not None else ()) + (
             ("TRIANGLE_LIGHTS",) if self.light_count else ()
         )

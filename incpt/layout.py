@@ -100,7 +100,11 @@ class PathPlane(IntEnum):
 
 
 class ShadowPlane(IntEnum):
-    """Planes of the shadow ray of a path and of the radiance that it brings when nothing is in its way."""
+    """Planes of the shadow ray of a path and of the radiance that it brings when nothing is in its way.
+
+    `illuminate` leaves a light sample in them: direction, distance, radiance of the light, and PDF, the
+    solid-angle density of the direction; shading turns the radiance into what the path gains.
+    """
 
     ORIGIN_X = 0
     ORIGIN_Y = 1
@@ -112,6 +116,35 @@ class ShadowPlane(IntEnum):
     RADIANCE_R = 7
     RADIANCE_G = 8
     RADIANCE_B = 9
+    PDF = 10
+
+
+class LightPlane(IntEnum):
+    """Planes of the emissive triangles (world space); their stride is the number of lights.
+
+    Planes also here, because LLVM would fuse loads of neighbouring struct members into short vectors
+    before PoCL comes to vectorise over work-items, and those it does not vectorise over.
+
+    PDF_AREA is the density of choosing the triangle and a point on it, per square metre; ALIAS (uint) and
+    ALIAS_PROBABILITY are the Walker/Vose table over the triangles; DOUBLE_SIDED is 0 or 1 (uint).
+    """
+
+    VERTEX_X = 0
+    VERTEX_Y = 1
+    VERTEX_Z = 2
+    EDGE_1_X = 3
+    EDGE_1_Y = 4
+    EDGE_1_Z = 5
+    EDGE_2_X = 6
+    EDGE_2_Y = 7
+    EDGE_2_Z = 8
+    EMISSION_R = 9
+    EMISSION_G = 10
+    EMISSION_B = 11
+    PDF_AREA = 12
+    ALIAS_PROBABILITY = 13
+    ALIAS = 14
+    DOUBLE_SIDED = 15
 
 
 class PathClass(IntFlag):
@@ -157,7 +190,8 @@ TRIANGLE_PACK = _packed(
     [
         # vertex[3 * corner + axis][lane], object space.
         ("vertex", np.float32, (9, BVH_WIDTH)),
-        # Index of the face in its mesh, NO_INDEX for an unused lane (all its vertices are 0).
+        # Index of the face in its mesh, NO_INDEX for an unused lane. Vertices are NaN there and
+        # where a face has no area: no comparison with them holds, so that no ray meets them.
         ("face", np.uint32, (BVH_WIDTH,)),
     ]
 )
@@ -193,19 +227,6 @@ MATERIAL = _packed(
         ("unused_0", np.uint32),
         ("unused_1", np.uint32),
         ("unused_2", np.uint32),
-    ]
-)
-
-LIGHT = _packed(
-    [
-        ("vertex", np.float32, (3,)),  # world space
-        ("edge_1", np.float32, (3,)),
-        ("edge_2", np.float32, (3,)),
-        ("emission", np.float32, (3,)),
-        ("pdf_area", np.float32),  # of choosing this triangle, and a point on it, per square metre
-        ("alias_probability", np.float32),  # Walker/Vose alias table over the triangles
-        ("alias", np.uint32),
-        ("double_sided", np.uint32),
     ]
 )
 
@@ -262,7 +283,6 @@ STRUCTS: dict[str, np.dtype] = {
     "TrianglePack": TRIANGLE_PACK,
     "Object": OBJECT,
     "Material": MATERIAL,
-    "Light": LIGHT,
     "Slot": SLOT,
     "Camera": CAMERA,
     "Params": PARAMS,
@@ -311,6 +331,7 @@ def c_header() -> str:
         (HitPlane, "HIT"),
         (PathPlane, "PATH"),
         (ShadowPlane, "SHADOW"),
+        (LightPlane, "LIGHT"),
         (PathClass, "CLASS"),
         (SlotFlag, "SLOT"),
         (MaterialFlag, "MATERIAL"),

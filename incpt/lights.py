@@ -25,49 +25,59 @@ def radiant_weight(material: Material) -> float:
 
 @dataclass(frozen=True, eq=False)
 class TriangleLights:
-    """`rows` (N,) layout.LIGHT, in world space; `total` is the sum of area times `radiant_weight`."""
+    """`planes` (len(LightPlane), N) float32 (uints bit for bit); `total`: sum of area times `radiant_weight`."""
 
-    rows: npt.NDArray[np.void]
+    planes: npt.NDArray[np.float32]
     total: float
+
+    @property
+    def count(self) -> int:
+        return self.planes.shape[1]
 
 
 def triangle_lights(scene: Scene, share: float) -> TriangleLights:
     """Every visible emissive triangle that has an area. `share` is the chance that light sampling turns to
     triangles at all; the densities contain it."""
-    parts = []
+    corners, emission, weights, double_sided = [], [], [], []
     for obj in scene.objects:
         material = scene.materials[obj.material]
-        if obj.visible and radiant_weight(material) > 0:
-            vertices = transform.apply_affine(obj.world_from_object, obj.mesh.vertices)
-            if np.linalg.det(obj.world_from_object[:, :3]) < 0:
-                # A mirrored face keeps its outside: swap two corners to keep it on the normal's side.
-                parts.append(_rows(vertices[obj.mesh.faces[:, [0, 2, 1]]], material))
-            else:
-                parts.append(_rows(vertices[obj.mesh.faces], material))
-    rows = np.concatenate(parts) if parts else np.zeros(0, layout.LIGHT)
-    weights = rows["pdf_area"] * _areas(rows)
-    rows, weights = rows[weights > 0], weights[weights > 0]
-    total = float(weights.sum())
-    if len(rows):
-        rows["alias_probability"], rows["alias"] = alias_table(weights)
-        rows["pdf_area"] *= share / total
-    return TriangleLights(rows, total)
+        if not obj.visible or radiant_weight(material) == 0:
+            continue
+        # A mirrored face keeps its outside: two corners change places to keep it on the normal's side.
+        mirrored = np.linalg.det(obj.world_from_object[:, :3]) < 0
+        faces = obj.mesh.faces[:, [0, 2, 1]] if mirrored else obj.mesh.faces
+        corners.append(transform.apply_affine(obj.world_from_object, obj.mesh.vertices)[faces])
+        emission.append(np.broadcast_to(material.emission, (len(faces), 3)))
+        weights.append(np.full(len(faces), radiant_weight(material)))
+        double_sided.append(np.full(len(faces), material.double_sided))
+    if not corners:
+        return TriangleLights(np.zeros((len(layout.LightPlane), 0), np.float32), 0.0)
+    return _triangle_planes(*map(np.concatenate, (corners, emission, weights, double_sided)), share)
 
 
-def _rows(corners: npt.NDArray[np.float64], material: Material) -> npt.NDArray[np.void]:
-    rows = np.zeros(len(corners), layout.LIGHT)
-    rows["vertex"] = corners[:, 0]
-    rows["edge_1"] = corners[:, 1] - corners[:, 0]
-    rows["edge_2"] = corners[:, 2] - corners[:, 0]
-    rows["emission"] = material.emission
-    rows["double_sided"] = material.double_sided
-    rows["pdf_area"] = radiant_weight(material)
-    return rows
-
-
-def _areas(rows: npt.NDArray[np.void]) -> npt.NDArray[np.float64]:
-    cross = np.cross(rows["edge_1"].astype(np.float64), rows["edge_2"].astype(np.float64))
-    return np.asarray(np.linalg.norm(cross, axis=1) / 2)
+def _triangle_planes(
+    corners: npt.NDArray[np.float64],
+    emission: npt.NDArray[np.float64],
+    weights: npt.NDArray[np.float64],
+    double_sided: npt.NDArray[np.bool_],
+    share: float,
+) -> TriangleLights:
+    edge_1, edge_2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    power = weights * np.linalg.norm(np.cross(edge_1, edge_2), axis=1) / 2
+    kept = power > 0
+    total = float(power[kept].sum())
+    planes = np.zeros((len(layout.LightPlane), int(kept.sum())), np.float32)
+    if total > 0:
+        plane = layout.LightPlane
+        planes[plane.VERTEX_X : plane.VERTEX_Z + 1] = corners[kept, 0].T
+        planes[plane.EDGE_1_X : plane.EDGE_1_Z + 1] = edge_1[kept].T
+        planes[plane.EDGE_2_X : plane.EDGE_2_Z + 1] = edge_2[kept].T
+        planes[plane.EMISSION_R : plane.EMISSION_B + 1] = emission[kept].T
+        planes[plane.PDF_AREA] = weights[kept] * (share / total)
+        planes[plane.ALIAS_PROBABILITY], alias = alias_table(power[kept])
+        planes[plane.ALIAS] = alias.view(np.float32)
+        planes[plane.DOUBLE_SIDED] = double_sided[kept].astype(np.uint32).view(np.float32)
+    return TriangleLights(planes, total)
 
 
 def alias_table(

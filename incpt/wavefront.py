@@ -4,7 +4,7 @@ Instead of one kernel with the path loop, each stage of all paths runs as a kern
 of the paths that need it: a terminated path costs nothing more, and on PoCL the straight-line stages run
 in SIMD lanes. Paths are traced in chunks whose state fits the caches of a CPU.
 
-    generate -> [ intersect -> (medium_shade) -> shade -> occlude ] once a ray -> radiance of each path
+    generate -> [ intersect -> illuminate -> (medium_shade) -> shade -> occlude ] once a ray -> radiance
 """
 
 from __future__ import annotations
@@ -105,22 +105,11 @@ class Wavefront:
     ) -> int:
         """One ray of every live path; returns how many paths go on."""
         self._intersect(scene, params, count)
-        surfaces, surface_count = self._live, count
+        self._illuminate(scene, params, count)
         state = (self._hits, self._rays, self._paths, self._shadows, radiance)
+        surfaces, surface_count = self._live, count
         if scene.has_media:
-            surface_count, medium_count = self._compact(
-                params, count, self._live, _Class.SURFACE, self._first, _Class.MEDIUM, self._second
-            )
-            surfaces = self._first
-            if medium_count:
-                self._launch(
-                    "medium_shade", medium_count, params, np.uint32(medium_count), self._second,
-                    scene.buffer("materials"), *scene.emitters, *state, features=scene.features,
-                )  # fmt: skip
-                # Those that stand on an opaque surface inside a medium join the others.
-                surface_count, _ = self._compact(
-                    params, medium_count, self._second, _Class.SURFACE, self._first, append=True
-                )
+            surfaces, surface_count = self._shade_media(scene, params, count, state)
         if surface_count:
             self._launch(
                 "shade", surface_count, params, np.uint32(surface_count), surfaces, scene.buffer("materials"),
@@ -142,6 +131,35 @@ class Wavefront:
             "intersect", count, params, np.uint32(count), self._live, *scene.geometry, scene.buffer("normals"),
             self._rays, self._paths, self._hits,
         )  # fmt: skip
+
+    def _illuminate(self, scene: DeviceScene, params: npt.NDArray[np.void], count: int) -> None:
+        if scene.features:
+            self._launch(
+                "illuminate", count, params, np.uint32(count), self._live, *scene.emitters, self._hits,
+                self._paths, self._shadows, features=scene.features,
+            )  # fmt: skip
+
+    def _shade_media(
+        self,
+        scene: DeviceScene,
+        params: npt.NDArray[np.void],
+        count: int,
+        state: tuple[cl.Buffer, ...],
+    ) -> tuple[cl.Buffer, int]:
+        """Shade the paths at or in transparent bodies; returns the list of those on opaque surfaces."""
+        surface_count, medium_count = self._compact(
+            params, count, self._live, _Class.SURFACE, self._first, _Class.MEDIUM, self._second
+        )
+        if medium_count:
+            self._launch(
+                "medium_shade", medium_count, params, np.uint32(medium_count), self._second,
+                scene.buffer("materials"), *state, features=scene.features,
+            )  # fmt: skip
+            # Those that stand on an opaque surface inside a medium join the others.
+            surface_count, _ = self._compact(
+                params, medium_count, self._second, _Class.SURFACE, self._first, append=True
+            )
+        return self._first, surface_count
 
     def _compact(
         self,
