@@ -210,8 +210,8 @@ static Box face_box(__global const int *faces, __global const float *vertices, u
     return box;
 }
 
-// Copies a face into a lane of a pack. A face without area is drawn together into a point, which no ray
-// meets, so that a hit always has a normal.
+// Copies a face into a lane of a pack. A face without area gets no numbers for vertices, as do unused lanes:
+// every comparison with them is false, so that no ray meets them and a hit always has a normal.
 static void write_face(__global TrianglePack *pack, uint lane_index, __global const int *faces,
                        __global const float *vertices, uint face) {
     float vertex[3][3], normal[3];
@@ -220,13 +220,13 @@ static void write_face(__global TrianglePack *pack, uint lane_index, __global co
             vertex[corner][axis] = vertices[3 * (size_t)faces[3 * (size_t)face + corner] + axis];
     const bool flat = !bvh_normal(vertex, normal);
     for (uint i = 0; i < 9; i++)
-        pack->vertex[i][lane_index] = vertex[flat ? 0 : i / 3][i % 3];
+        pack->vertex[i][lane_index] = flat ? NAN : vertex[i / 3][i % 3];
     pack->face[lane_index] = face;
 }
 
 static void clear_lane(__global TrianglePack *pack, uint lane_index) {
     for (uint i = 0; i < 9; i++)
-        pack->vertex[i][lane_index] = 0.0f;
+        pack->vertex[i][lane_index] = NAN;
     pack->face[lane_index] = NO_INDEX;
 }
 
