@@ -70,13 +70,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.showwarning = _show_warning
     try:
         result = app([a for a in given if a != "--debug"], prog_name="incpt", standalone_mode=False)
+        if result == INTERRUPTED:  # what typer makes of KeyboardInterrupt
+            raise KeyboardInterrupt
         return result if isinstance(result, int) else 0
     except (KeyboardInterrupt, typer.Abort):
         return _complain("stopped", INTERRUPTED)
+    except _StoppedError as error:
+        return _complain(str(error), INTERRUPTED)
     except Exception as error:
         if debug:
             traceback.print_exc()
         return _complain(*_explain(error))
+
+
+class _StoppedError(Exception):
+    """A command was interrupted and kept what it had; the message says what."""
 
 
 def _explain(error: Exception) -> tuple[str, int]:
@@ -196,7 +204,7 @@ def render(
         _complain(f"warning: {nonfinite:,} samples were not finite and count as black", 0)
     print(f"{output}: {session.size[0]} x {session.size[1]}, {samples} samples per pixel")
     if stop.requested:
-        raise typer.Exit(_complain(f"stopped at {samples} of {spp} samples per pixel", INTERRUPTED))
+        raise _StoppedError(f"stopped at {samples} of {spp} samples per pixel")
 
 
 @app.command()
@@ -245,10 +253,11 @@ def replay(
             if not stop.requested:
                 raise
         report.finish()
-    Console(soft_wrap=True).print(report.table())
+    if report.has_captures:
+        Console(soft_wrap=True).print(report.table())
     print(f"{output}: pictures, {report.sheet_path.name}, {report.csv_path.name}")
     if stop.requested:
-        raise typer.Exit(_complain(f"stopped; {output} holds what was done", INTERRUPTED))
+        raise _StoppedError(f"stopped; {output} holds what was done")
 
 
 @app.command()

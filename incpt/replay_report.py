@@ -47,6 +47,11 @@ class ReplayReport:
         """All pictures on one page."""
         return self.folder / "sheet.png"
 
+    @property
+    def has_captures(self) -> bool:
+        """Whether there is anything to tabulate."""
+        return bool(self._captures)
+
     def add(self, picture: Converged | Capture) -> None:
         """Write a picture, and keep it for the sheet."""
         if isinstance(picture, Capture):
@@ -65,7 +70,7 @@ class ReplayReport:
     def finish(self) -> None:
         """Write the table of errors and, where there is a capture, the contact sheet."""
         files.write_bytes(self.csv_path, self._csv())
-        if self._captures:
+        if self.has_captures:
             encoded = io.BytesIO()
             PIL.Image.fromarray(contact_sheet(self._blocks())).save(encoded, "PNG")
             files.write_bytes(self.sheet_path, encoded.getvalue())

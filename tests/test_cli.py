@@ -133,7 +133,7 @@ def test_ctrl_c_outside_of_a_step(
 
     monkeypatch.setattr(scene_io, "load", interrupted)
     assert run("check", scene_file) == 130
-    assert "Traceback" not in capsys.readouterr().err
+    assert only_line(capsys.readouterr().err) == "incpt: stopped"
 
 
 def test_samples_that_are_not_finite_are_told(
