@@ -13,7 +13,7 @@
 
 typedef float8 Box;
 
-#define BIN_COUNT 16
+#define BIN_COUNT 32
 #define JOIN(a, b) ((a) < (b) ? (a) : (b))
 #define BOX_EMPTY ((Box)(INFINITY))
 // Twice the centre in s012, and its negation in s456: a box around a point.
