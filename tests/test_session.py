@@ -1,0 +1,325 @@
+"""The session: what a step does, what an edit keeps, and when it starts over."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_scenes import mixed_scene, small_settings
+
+from incpt.device import Device
+from incpt.errors import InputError
+from incpt.modes import Mode
+from incpt.scene import Object, Scene, shape
+from incpt.session import Session
+from incpt.tiles import Cursor, Queue, base_queue
+
+
+def rendered(device: Device, scene: Scene, spp: int, **settings: object) -> Session:
+    session = Session(scene, settings=replace(scene.settings, **settings), device=device)
+    session.render(spp)
+    return session
+
+
+def assert_same(a: np.ndarray, b: np.ndarray) -> None:
+    """The same samples, added up in another order."""
+    np.testing.assert_allclose(a, b, rtol=2e-4, atol=1e-5)
+
+
+@pytest.fixture(scope="module")
+def converged(device: Device) -> np.ndarray:
+    """64 samples of the mixed scene, one a step."""
+    return rendered(device, mixed_scene(), 64).image()
+
+
+def test_starts_black_and_finishes_base_in_one_step(device: Device) -> None:
+    session = Session(mixed_scene(), device=device)
+    assert session.mode is Mode.BASE
+    assert not session.image().any() and not session.spp().any()
+    report = session.step()
+    assert report.mode is Mode.BASE and session.mode is Mode.REFINE
+    assert report.tiles.tolist() == list(range(24))
+    assert report.queue_done == report.queue_length == 24
+    assert (session.spp() == 1).all()
+    assert np.isfinite(session.image()).all() and session.image().mean() > 0.05
+    assert report.nonfinite == 0
+
+
+def test_refine_accumulates(device: Device) -> None:
+    session = rendered(device, mixed_scene(), 3)
+    assert (session.spp() == 3).all() and session.mode is Mode.REFINE
+
+
+def test_picture_has_the_size_asked_for(device: Device) -> None:
+    session = Session(mixed_scene(), size=(19, 11), device=device)
+    session.step()
+    assert session.image().shape == (11, 19, 3)
+    assert session.image().dtype == np.float32
+
+
+@pytest.mark.parametrize(("nor", "slots"), [(1, 7), (16, None), (16, 5), (64, None), (64, 5), (64, 300)])
+def test_repetitions_equal_refinement_passes(
+    device: Device, converged: np.ndarray, nor: int, slots: int | None
+) -> None:
+    assert_same(rendered(device, mixed_scene(base_nor=nor, slots_per_step=slots), 64).image(), converged)
+
+
+def test_nor_256_equals_256_refinement_passes(device: Device) -> None:
+    passes = rendered(device, mixed_scene(), 256).image()
+    tile = rendered(device, mixed_scene(base_nor=256, slots_per_step=100), 256)
+    assert (tile.spp() == 256).all()
+    assert_same(tile.image(), passes)
+
+
+def test_sample_rate_multiplies_samples(device: Device, converged: np.ndarray) -> None:
+    session = Session(mixed_scene(sample_rate=4), device=device)
+    session.step()
+    assert (session.spp() == 4).all()
+    session.render(64)
+    assert_same(session.image(), converged)
+
+
+def test_order_of_tiles_does_not_matter(device: Device, converged: np.ndarray) -> None:
+    session = Session(mixed_scene(), device=device)
+    order = np.random.default_rng(5).permutation(base_queue(session.grid))
+    session._queue = Queue(order.astype(np.int32), 64, True)  # any order: the public ways offer two
+    session.render(64)
+    assert_same(session.image(), converged)
+
+
+@pytest.mark.parametrize("tile_size", [1, 5, 16, 64])
+def test_tile_size_does_not_matter(device: Device, converged: np.ndarray, tile_size: int) -> None:
+    assert_same(rendered(device, mixed_scene(tile_size=tile_size, base_nor=8), 64).image(), converged)
+
+
+def test_chunks_do_not_matter(device: Device, converged: np.ndarray) -> None:
+    session = Session(mixed_scene(base_nor=4), device=device)
+    session._wavefront.chunk_paths = 320  # less than a group of slots
+    session.render(64)
+    assert_same(session.image(), converged)
+
+
+def test_seeds_give_other_noise(device: Device) -> None:
+    a, b = (rendered(device, mixed_scene(seed=seed), 1).image() for seed in (0, 1))
+    assert np.abs(a - b).mean() > 0.01
+
+
+def moved(scene: Scene) -> Scene:
+    return scene.with_object("red cube", position=(0.2, 0.5, 0.4))
+
+
+def test_edit_replaces_tile_by_tile_from_the_point_of_change(device: Device) -> None:
+    session = rendered(device, mixed_scene(slots_per_step=32), 4)
+    before = session.image()
+    session.edit(moved(session.scene))
+    assert session.mode is Mode.INCREMENTAL
+    assert_same(session.image(), before)
+    report = session.step()
+    assert report.mode is Mode.INCREMENTAL and len(report.tiles) == 2
+    # The cube is right of the middle of the image, and so is the first tile.
+    x, y = session.grid.origin(int(report.tiles[0]))
+    assert 16 <= x <= 24 and 8 <= y <= 16
+    after = session.image()
+    changed = np.zeros(before.shape[:2], bool)
+    for tile in report.tiles:
+        x, y = session.grid.origin(int(tile))
+        changed[y : y + 8, x : x + 8] = True
+    assert (session.spp() == np.where(changed, 16, 4)).all()
+    np.testing.assert_array_equal(after[~changed], before[~changed])
+    fresh = rendered(device, moved(mixed_scene()), 16).image()
+    assert_same(after[changed], fresh[changed])
+
+
+def test_tile_is_shown_only_when_complete(device: Device) -> None:
+    session = rendered(device, mixed_scene(slots_per_step=6), 2)
+    session.edit(moved(session.scene))
+    before = session.image()
+    for _ in range(2):
+        assert len(session.step().tiles) == 0
+        np.testing.assert_array_equal(session.image(), before)
+    assert len(session.step().tiles) == 1  # 18 slots for 16 repetitions
+    assert (session.image() != before).any()
+
+
+def test_incremental_ends_in_refine(device: Device) -> None:
+    session = rendered(device, mixed_scene(), 2)
+    session.edit(moved(session.scene))
+    reports = []
+    while session.mode is Mode.INCREMENTAL:
+        reports.append(session.step())
+    assert session.mode is Mode.REFINE and (session.spp() == 16).all()
+    assert sorted(tile for report in reports for tile in report.tiles) == list(range(24))
+
+
+def test_edit_during_incremental_starts_a_new_spiral(device: Device) -> None:
+    session = rendered(device, mixed_scene(slots_per_step=64), 2)
+    session.edit(moved(session.scene))
+    session.step()
+    session.edit(session.scene.with_object("grey drum", position=(-1.2, 0.4, 0)))
+    assert session.mode is Mode.INCREMENTAL and session.cursor == Cursor()
+    x, _ = session.grid.origin(int(session.queue.tiles[0]))
+    assert x < 16
+
+
+@pytest.mark.parametrize("edit", [lambda s: s.with_camera(fov_y=50.0), lambda s: s.with_environment(intensity=1.0)])
+def test_global_change_starts_over(device: Device, edit) -> None:
+    session = rendered(device, mixed_scene(slots_per_step=8), 2)
+    before = session.image()
+    session.edit(edit(session.scene))
+    assert session.mode is Mode.BASE and not session.spp().any()
+    # Until a tile is rendered anew, the old picture stands in for it.
+    np.testing.assert_array_equal(session.image(), before)
+    session.step()
+    assert np.unique(session.spp()).tolist() == [0, 1]
+
+
+def test_restart_strategy_starts_over_on_every_edit(device: Device) -> None:
+    session = rendered(device, mixed_scene(strategy="restart"), 2)
+    session.edit(moved(session.scene))
+    assert session.mode is Mode.BASE
+
+
+def test_change_that_nobody_sees_keeps_everything(device: Device) -> None:
+    session = rendered(device, mixed_scene(), 2)
+    session.edit(session.scene.with_material("unused", roughness=0.3))
+    session.edit(session.scene.with_material("unused", roughness=0.7))
+    session.edit(session.scene)
+    session.edit(replace(session.scene, objects=session.scene.objects[::-1]))
+    assert session.mode is Mode.REFINE and (session.spp() == 2).all()
+    assert_same(rendered(device, mixed_scene(), 3).image(), (session.step(), session.image())[1])
+
+
+def test_point_of_change_may_be_the_pixel(device: Device) -> None:
+    session = rendered(device, mixed_scene(point_of_change="pixel"), 1)
+    session.edit(moved(session.scene), pixel=(43, 27))
+    assert session.queue.tiles[0] == session.grid.count - 1
+
+
+@pytest.mark.parametrize(("position", "corner"), [((-40, 0.5, -5), 0), ((40, 0.5, -5), 5)])
+def test_point_of_change_off_screen_starts_at_that_side(
+    device: Device, position: tuple[float, float, float], corner: int
+) -> None:
+    scene = mixed_scene().with_added(Object("far", shape("cube"), "red", position=position))
+    session = rendered(device, scene, 1)
+    session.edit(scene.with_object("far", rotation=(0, 10, 0)))
+    assert session.queue.tiles[0] % session.grid.columns == corner
+
+
+def test_edit_behind_the_camera_starts_at_the_centre(device: Device) -> None:
+    scene = mixed_scene().with_added(Object("behind", shape("cube"), "red", position=(0, 1, 9)))
+    session = rendered(device, scene, 1)
+    session.edit(scene.without_object("behind"))
+    assert session.mode is Mode.INCREMENTAL
+    assert session.queue.tiles[0] == session.grid.tile_at(22, 14)
+
+
+def test_failed_edit_keeps_scene_and_picture(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = rendered(device, mixed_scene(), 2)
+    before, scene = session.image(), session.scene
+
+    def fail(*_: object) -> None:
+        raise MemoryError
+
+    with monkeypatch.context() as patch:
+        patch.setattr("incpt.bvh.build_top", fail)
+        with pytest.raises(MemoryError):
+            session.edit(moved(scene))
+    assert session.scene is scene and session.mode is Mode.REFINE
+    np.testing.assert_array_equal(session.image(), before)
+    session.render(4)
+    assert_same(session.image(), rendered(device, mixed_scene(), 4).image())
+
+
+@pytest.mark.parametrize("name", ["max_bounces", "transmission_bounces", "roulette_depth", "seed"])
+def test_settings_of_the_picture_start_over(device: Device, name: str) -> None:
+    session = rendered(device, mixed_scene(), 2)
+    session.configure(replace(session.settings, **{name: getattr(session.settings, name) + 1}))
+    assert session.mode is Mode.BASE
+    session.render(2)
+    assert_same(session.image(), rendered(device, mixed_scene(), 2, **{name: getattr(session.settings, name)}).image())
+
+
+def test_settings_of_the_method_keep_the_picture(device: Device) -> None:
+    session = rendered(device, mixed_scene(), 2)
+    session.configure(replace(session.settings, nor=3, strategy="restart", slots_per_step=5, base_nor=2))
+    assert session.mode is Mode.REFINE and (session.spp() == 2).all()
+    session.render(6)
+    assert_same(session.image(), rendered(device, mixed_scene(), 6).image())
+
+
+def test_another_size_starts_a_new_film(device: Device) -> None:
+    session = rendered(device, mixed_scene(), 2)
+    session.configure(replace(session.settings, size=(30, 20)))
+    assert not session.image().any() and session.image().shape == (20, 30, 3)
+    session.render(2)
+    assert_same(session.image(), rendered(device, mixed_scene(size=(30, 20)), 2).image())
+
+
+def test_snapshot_brings_the_picture_back(device: Device) -> None:
+    session = rendered(device, mixed_scene(), 3)
+    snapshot, before = session.snapshot(), session.image()
+    session.edit(moved(session.scene).with_camera(fov_y=60.0))
+    session.render(2)
+    session.restore(snapshot)
+    np.testing.assert_array_equal(session.image(), before)
+    session.render(5)
+    assert_same(session.image(), rendered(device, mixed_scene(), 5).image())
+
+
+def test_picks_what_is_under_the_pixel(device: Device) -> None:
+    session = Session(mixed_scene(), device=device)
+    assert session.pick((22, 14)) == "red cube"
+    assert session.pick((2, 26)) == "floor"
+    assert session.pick((0, 0)) is None
+    with pytest.raises(InputError, match="outside the image"):
+        session.pick((44, 0))
+
+
+def test_pick_passes_hidden_objects(device: Device) -> None:
+    session = Session(mixed_scene().with_object("red cube", visible=False), device=device)
+    assert session.pick((22, 14)) != "red cube"
+
+
+def test_pick_keeps_the_picture(device: Device) -> None:
+    session = rendered(device, mixed_scene(), 2)
+    before = session.image()
+    session.pick((5, 5))
+    session.aovs()
+    np.testing.assert_array_equal(session.image(), before)
+    session.render(4)
+    assert_same(session.image(), rendered(device, mixed_scene(), 4).image())
+
+
+def test_aovs_describe_first_hits(device: Device) -> None:
+    session = Session(mixed_scene(), device=device)
+    aovs = session.aovs()
+    names = [o.name for o in session.scene.objects]
+    assert names[aovs.object_id[14, 22]] == "red cube" == session.pick((22, 14))
+    assert aovs.object_id[0, 0] == -1 and np.isinf(aovs.depth[0, 0]) and not aovs.normal[0, 0].any()
+    assert names[aovs.object_id[26, 2]] == "floor"
+    np.testing.assert_allclose(aovs.normal[26, 2], (0, 1, 0), atol=1e-6)
+    np.testing.assert_allclose(aovs.albedo[14, 22], (0.8, 0.1, 0.1), atol=1e-6)
+    hit = aovs.object_id >= 0
+    np.testing.assert_allclose(np.linalg.norm(aovs.normal[hit], axis=1), 1, atol=1e-5)
+    # The floor lies 1.4 m below the camera: distance along the ray from its angle.
+    height, half = 1.4, np.tan(np.radians(21))
+    y = (1 - 2 * (26.5 / 28)) * half
+    x = (2 * (2.5 / 44) - 1) * half * 44 / 28
+    pitch = np.arctan2(-0.9, 4.2)
+    down = -(np.sin(pitch) + y * np.cos(pitch)) / np.sqrt(1 + x * x + y * y)
+    np.testing.assert_allclose(aovs.depth[26, 2], height / down, rtol=1e-4)
+
+
+def test_empty_scene_is_the_environment(device: Device) -> None:
+    session = Session(Scene(settings=small_settings()).with_environment(color=(0.2, 0.4, 0.6)), device=device)
+    session.step()
+    np.testing.assert_allclose(session.image(), np.broadcast_to((0.2, 0.4, 0.6), (28, 44, 3)), rtol=1e-6)
+    assert session.pick((3, 3)) is None
+
+
+def test_render_reports_every_step(device: Device) -> None:
+    reports = []
+    Session(mixed_scene(), device=device).render(3, reports.append)
+    assert [report.mode for report in reports] == [Mode.BASE, Mode.REFINE, Mode.REFINE]
+    assert all(report.paths == 24 * 64 and report.seconds > 0 for report in reports)
