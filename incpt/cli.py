@@ -254,7 +254,7 @@ def replay(
                 raise
         report.finish()
     if report.has_captures:
-        Console(soft_wrap=True).print(report.table())
+        _print_table(report.table())
     print(f"{output}: pictures, {report.sheet_path.name}, {report.csv_path.name}")
     if stop.requested:
         raise _StoppedError(f"stopped; {output} holds what was done")
@@ -281,7 +281,7 @@ def devices(
             f"{one.global_mem_size / 2**30:.1f} GiB",
             "taken" if one == taken else "",
         )
-    Console(soft_wrap=True).print(table)
+    _print_table(table)
     if test:
         Session(Scene(), size=(16, 16), device=device).step()
         print("the kernels build and run")
@@ -314,6 +314,11 @@ def _settings(scene: Scene, size: str | None, **given: Any) -> RenderSettings:
 def _padded_pixels(settings: RenderSettings) -> int:
     """Paths of one sample per pixel: cut tiles trace as many as whole ones."""
     return TileGrid(*settings.size, settings.tile_size).count * settings.tile_size**2
+
+
+def _print_table(table: Table) -> None:
+    console = Console()
+    console.print(table, width=None if console.is_terminal else 120)
 
 
 def _parse_size(text: str) -> tuple[int, int]:

@@ -81,10 +81,10 @@ class ReplayReport:
         table = Table(
             title="normalized RMSE after so many steps", title_justify="left", box=None, pad_edge=False
         )
-        table.add_column("edit", no_wrap=True)
+        table.add_column("edit")
         table.add_column("strategy", no_wrap=True)
         for step in steps:
-            table.add_column(str(step), justify="right")
+            table.add_column(str(step), justify="right", min_width=6, no_wrap=True)
         errors = {(c.edit, c.variant, c.step): f"{c.normalized_rmse:.4f}" for c in self._captures}
         for edit, variant in self._cells:
             row = [errors.get((edit, variant, step), "") for step in steps]

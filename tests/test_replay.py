@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import signal
 from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +15,13 @@ import pytest
 from incpt.cli import main
 from incpt.contact_sheet import Block, Cell, Row, contact_sheet
 from incpt.device import Device
-from incpt.edit_script import Edit, EditScript
+from incpt.edit_script import Edit, EditScript, load_edits
 from incpt.errors import InputError
 from incpt.image_io import tone_map
 from incpt.metrics import normalized_rmse, relative_mse
 from incpt.replay import Capture, Converged, Replay, Variant, variants
-from incpt.scene import Camera, Environment, Material, Object, Scene, shape
+from incpt.scene import Camera, Environment, Material, Object, Scene, diff, shape
+from incpt.scene_io import load
 from incpt.session import Session
 from incpt.settings import RenderSettings
 
@@ -288,3 +290,15 @@ def test_the_sheet_shows_text() -> None:
     block = Block("title", [Row("label", [Cell(white, "caption")])])
     assert (contact_sheet([block]) < 100).any()
     assert (tone_map(np.full((1, 1, 3), 1e6)) == 255).all()
+
+
+def test_the_demo_makes_the_edits_of_the_thesis() -> None:
+    folder = Path(str(resources.files("incpt.scenes")))
+    before = load(folder / "editing.toml")
+    script = load_edits(folder / "thesis_edits.toml", before)
+    assert not script.cumulative
+    changed = [diff(before, after).moved for after in script.scenes(before)]
+    assert changed == [{"small grey cube"}, {"red cube"}, {"large translucent cube"}]
+    for name, after in zip(("small grey cube", "red cube"), script.scenes(before), strict=False):
+        lowest = after.object(name).world_bounds[0, 1]
+        assert 0 <= lowest < 0.01, "stands on the floor"
