@@ -75,13 +75,13 @@ INLINE uint reverse_bits(uint x) {
 }
 
 // Sine and cosine of an angle in turns, 0 <= turns <= 1; absolute error below 2e-7. The angle is reduced
-// to an eighth of a turn on either side of a quarter; the Taylor series is exact to float there.
+// to an eighth of a turn on either side of a quarter; the polynomials are S. Moshier's (Cephes).
 INLINE void sincos_turns(float turns, float *sine, float *cosine) {
     float quarter = FLOOR(4.0f * turns + 0.5f);
     float x = (turns - 0.25f * quarter) * (2.0f * PI);
     float x2 = x * x;
-    float s = x * (1.0f + x2 * (-1.6666667e-1f + x2 * (8.3333333e-3f + x2 * -1.9841270e-4f)));
-    float c = 1.0f + x2 * (-0.5f + x2 * (4.1666667e-2f + x2 * (-1.3888889e-3f + x2 * 2.4801587e-5f)));
+    float s = x * (1.0f + x2 * (-1.6666655e-1f + x2 * (8.3321609e-3f + x2 * -1.9515296e-4f)));
+    float c = 1.0f + x2 * (-0.5f + x2 * (4.1666646e-2f + x2 * (-1.3887316e-3f + x2 * 2.4433157e-5f)));
     int q = (int)quarter & 3;
     float s1 = q & 1 ? c : s;
     float c1 = q & 1 ? s : c;
