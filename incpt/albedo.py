@@ -17,7 +17,7 @@ import numpy.typing as npt
 from incpt.layout import ALBEDO_TABLE_SIZE
 from incpt.scene import Material
 
-_SAMPLES = 32
+_SAMPLES = 1024
 MIN_ALPHA = 1e-3
 """Least GGX alpha of an opaque surface, as in cl/material.cl."""
 
@@ -28,7 +28,9 @@ def table() -> npt.NDArray[np.float64]:
     grid = np.linspace(0.0, 1.0, ALBEDO_TABLE_SIZE)
     alpha = np.maximum(grid**2, MIN_ALPHA)[:, None, None]
     cosine = np.maximum(grid, 1e-3)[None, :, None]
-    u, v = ((np.indices((_SAMPLES, _SAMPLES)) + 0.5) / _SAMPLES).reshape(2, 1, 1, -1)
+    # A golden-ratio lattice: a grid resolves the edge where reflections sink below the surface ten times worse.
+    index = np.arange(_SAMPLES)[None, None, :]
+    u, v = index * ((5**0.5 - 1) / 2) % 1, (index + 0.5) / _SAMPLES
     wo = np.broadcast_arrays(np.sqrt(1 - cosine**2), 0.0, cosine)
     h = _visible_normal(wo, alpha, u, v)
     o_h = sum(a * b for a, b in zip(wo, h, strict=True))
@@ -72,7 +74,5 @@ def layer_row(material: Material) -> npt.NDArray[np.float32]:
     # Exact mean, weighted with the cosine, of what the kernels interpolate linearly.
     mu = np.linspace(0.0, 1.0, ALBEDO_TABLE_SIZE)
     step = mu[1]
-    mean = 2 * np.sum(
-        step / 6 * (albedo[:-1] * (2 * mu[:-1] + mu[1:]) + albedo[1:] * (mu[:-1] + 2 * mu[1:]))
-    )
+    mean = 2 * np.sum(step / 6 * (albedo[:-1] * (2 * mu[:-1] + mu[1:]) + albedo[1:] * (mu[:-1] + 2 * mu[1:])))
     return np.append(albedo, 1 / max(1 - mean, 1e-6)).astype(np.float32)
