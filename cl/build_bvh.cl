@@ -1,7 +1,8 @@
 // Builds 8-wide bounding volume hierarchies level by level, breadth first. A work-item owns one range of
 // boxes: it splits the range greedily (the child of largest area first) until it has eight children or
 // nothing is left to split, and writes the node. The host sums up the counts, so that nothing is atomic
-// and the same mesh always gives the same tree.
+// and the same mesh always gives the same tree. Very large ranges, of which there are too few to keep a
+// device busy, are cut into chunks: work-items measure, bin and move them, and the host chooses the split.
 //
 // Split: binned surface area heuristic (Wald 2007, "On fast Construction of SAH-based Bounding Volume
 // Hierarchies"), where a leaf costs whole packs: 9 triangles cost as much as 16.
@@ -13,7 +14,6 @@
 
 typedef float8 Box;
 
-#define BIN_COUNT 32
 #define JOIN(a, b) ((a) < (b) ? (a) : (b))
 #define BOX_EMPTY ((Box)(INFINITY))
 // Twice the centre in s012, and its negation in s456: a box around a point.
@@ -47,7 +47,7 @@ static float box_area(const Box box) {
 
 static uint bin_of(float center, float origin, float scale) {
     const int bin = (int)((center - origin) * scale);
-    return bin < 0 ? 0 : bin > BIN_COUNT - 1 ? BIN_COUNT - 1 : bin;
+    return bin < 0 ? 0 : bin > BVH_BINS - 1 ? BVH_BINS - 1 : bin;
 }
 
 static Range range_around(__global const Box *boxes, uint start, uint count) {
@@ -63,29 +63,23 @@ static Range range_around(__global const Box *boxes, uint start, uint count) {
 // Bins per unit along an axis; 0 where all centres fall together.
 static float bin_scale(const Box centers, uint axis) {
     const float extent = -lane(centers, axis + 4) - lane(centers, axis);
-    const float scale = BIN_COUNT * 0.999f / extent;
+    const float scale = BVH_BINS * 0.999f / extent;
     return extent > 0.0f && scale < 1e30f ? scale : 0.0f;
 }
 
-// The cheapest split of a range in bins along the three axes. False where no plane separates anything.
-static bool choose_split(__global const Box *boxes, const Range range, uint leaf_size, Split *best) {
-    Box bins[3 * BIN_COUNT];
-    uint counts[3 * BIN_COUNT];
-    float scale[3], origin[3];
-    for (uint i = 0; i < 3 * BIN_COUNT; i++) {
+// Joins boxes in bins by their centres: the bins of x, then y, then z.
+static void fill_bins(__global const Box *boxes, uint start, uint count, const float *origin,
+                      const float *scale, Box *bins, uint *counts) {
+    for (uint i = 0; i < 3 * BVH_BINS; i++) {
         bins[i] = BOX_EMPTY;
         counts[i] = 0;
     }
-    for (uint axis = 0; axis < 3; axis++) {
-        scale[axis] = bin_scale(range.centers, axis);
-        origin[axis] = lane(range.centers, axis);
-    }
-    for (uint i = range.start; i < range.start + range.count; i++) {
+    for (uint i = start; i < start + count; i++) {
         const Box box = boxes[i];
         const Box center = CENTER(box);
         const uint x = bin_of(center.s0, origin[0], scale[0]);
-        const uint y = bin_of(center.s1, origin[1], scale[1]) + BIN_COUNT;
-        const uint z = bin_of(center.s2, origin[2], scale[2]) + 2 * BIN_COUNT;
+        const uint y = bin_of(center.s1, origin[1], scale[1]) + BVH_BINS;
+        const uint z = bin_of(center.s2, origin[2], scale[2]) + 2 * BVH_BINS;
         bins[x] = JOIN(bins[x], box);
         bins[y] = JOIN(bins[y], box);
         bins[z] = JOIN(bins[z], box);
@@ -93,21 +87,33 @@ static bool choose_split(__global const Box *boxes, const Range range, uint leaf
         counts[y]++;
         counts[z]++;
     }
+}
+
+// The cheapest split of a range in bins along the three axes. False where no plane separates anything.
+static bool choose_split(__global const Box *boxes, const Range range, uint leaf_size, Split *best) {
+    Box bins[3 * BVH_BINS];
+    uint counts[3 * BVH_BINS];
+    float scale[3], origin[3];
+    for (uint axis = 0; axis < 3; axis++) {
+        scale[axis] = bin_scale(range.centers, axis);
+        origin[axis] = lane(range.centers, axis);
+    }
+    fill_bins(boxes, range.start, range.count, origin, scale, bins, counts);
     float best_cost = INFINITY;
     for (uint axis = 0; axis < 3; axis++) {
-        float right_cost[BIN_COUNT];
+        float right_cost[BVH_BINS];
         Box joined = BOX_EMPTY;
         uint count = 0;
-        for (uint bin = BIN_COUNT - 1; bin > 0; bin--) {
-            joined = JOIN(joined, bins[axis * BIN_COUNT + bin]);
-            count += counts[axis * BIN_COUNT + bin];
+        for (uint bin = BVH_BINS - 1; bin > 0; bin--) {
+            joined = JOIN(joined, bins[axis * BVH_BINS + bin]);
+            count += counts[axis * BVH_BINS + bin];
             right_cost[bin] = count ? box_area(joined) * ((count + leaf_size - 1) / leaf_size) : INFINITY;
         }
         joined = BOX_EMPTY;
         count = 0;
-        for (uint bin = 1; bin < BIN_COUNT; bin++) {
-            joined = JOIN(joined, bins[axis * BIN_COUNT + bin - 1]);
-            count += counts[axis * BIN_COUNT + bin - 1];
+        for (uint bin = 1; bin < BVH_BINS; bin++) {
+            joined = JOIN(joined, bins[axis * BVH_BINS + bin - 1]);
+            count += counts[axis * BVH_BINS + bin - 1];
             const float cost =
                 count ? box_area(joined) * ((count + leaf_size - 1) / leaf_size) + right_cost[bin] : INFINITY;
             if (cost < best_cost) {
@@ -240,14 +246,69 @@ __kernel void bound_faces(const uint count, __global const int *faces, __global 
     boxes[i] = box;
 }
 
-// Splits range i of a level into the children of node i. `children` gets start and count of each (count 0:
-// none), `counts` the number of inner children and of leaves. A range above `capacity` would not
-// fit the levels that are left unless it is split evenly.
-__kernel void split_ranges(const uint count, const uint leaf_size, const uint capacity, __global Box *boxes,
-                           __global const uint *ranges, __global Node *nodes, __global uint *children,
-                           __global uint *counts) {
+// What surrounds the boxes, and the centres, of chunk i: [start, start + count) in `chunks`.
+__kernel void measure_chunks(const uint count, __global const uint *chunks, __global const Box *boxes,
+                             __global Box *bounds) {
     const uint i = get_global_id(0);
     if (i >= count)
+        return;
+    const Range range = range_around(boxes, chunks[2 * i], chunks[2 * i + 1]);
+    bounds[2 * i] = range.bounds;
+    bounds[2 * i + 1] = range.centers;
+}
+
+__kernel void bin_chunks(const uint count, const float origin_x, const float origin_y, const float origin_z,
+                         const float scale_x, const float scale_y, const float scale_z,
+                         __global const uint *chunks, __global const Box *boxes, __global Box *all_bins,
+                         __global uint *all_counts) {
+    const uint i = get_global_id(0);
+    if (i >= count)
+        return;
+    const float origin[3] = {origin_x, origin_y, origin_z}, scale[3] = {scale_x, scale_y, scale_z};
+    Box bins[3 * BVH_BINS];
+    uint counts[3 * BVH_BINS];
+    fill_bins(boxes, chunks[2 * i], chunks[2 * i + 1], origin, scale, bins, counts);
+    for (uint bin = 0; bin < 3 * BVH_BINS; bin++) {
+        all_bins[3 * BVH_BINS * i + bin] = bins[bin];
+        all_counts[3 * BVH_BINS * i + bin] = counts[bin];
+    }
+}
+
+// Moves the boxes of chunk i to `moved`: those of lower bins to offsets[2 * i] and on, the others to
+// offsets[2 * i + 1] and on.
+__kernel void scatter_chunks(const uint count, const uint axis, const uint position, const float origin,
+                             const float scale, __global const uint *chunks, __global const uint *offsets,
+                             __global const Box *boxes, __global Box *moved) {
+    const uint i = get_global_id(0);
+    if (i >= count)
+        return;
+    uint left = offsets[2 * i], right = offsets[2 * i + 1];
+    for (uint k = chunks[2 * i]; k < chunks[2 * i] + chunks[2 * i + 1]; k++) {
+        const Box box = boxes[k];
+        if (bin_of(lane(CENTER(box), axis), origin, scale) < position)
+            moved[left++] = box;
+        else
+            moved[right++] = box;
+    }
+}
+
+__kernel void copy_chunks(const uint count, __global const uint *chunks, __global const Box *from,
+                          __global Box *to) {
+    const uint i = get_global_id(0);
+    if (i >= count)
+        return;
+    for (uint k = chunks[2 * i]; k < chunks[2 * i] + chunks[2 * i + 1]; k++)
+        to[k] = from[k];
+}
+
+// Splits range i of a level into the children of node i. `children` gets start and count of each (count 0:
+// none), `counts` the number of inner children and of leaves. A range above `capacity` would not
+// fit the levels that are left unless it is split evenly; one above `largest` is left to the host.
+__kernel void split_ranges(const uint count, const uint leaf_size, const uint capacity, const uint largest,
+                           __global Box *boxes, __global const uint *ranges, __global Node *nodes,
+                           __global uint *children, __global uint *counts) {
+    const uint i = get_global_id(0);
+    if (i >= count || ranges[2 * i + 1] > largest)
         return;
     Range parts[BVH_WIDTH];
     uint part_count = 1;

@@ -22,6 +22,11 @@ from incpt.device import Device
 from incpt.errors import InputError
 from incpt.scene import Mesh
 
+LARGEST_SERIAL_RANGE = 1 << 15
+"""Boxes that one work-item may split alone; larger ranges are too few to keep a device busy."""
+CHUNK = 1 << 12
+"""Boxes that one work-item takes of such a range."""
+
 _FILE = "build_bvh"
 
 
@@ -102,13 +107,17 @@ def _build(
 ) -> Bvh:
     # A top level has no faces: its kernel arguments are filled with any buffer and never read.
     mesh = (faces, vertices) if faces is not None else (boxes, boxes)
+    splitter = _Splitter(device, boxes, leaf_size) if count > LARGEST_SERIAL_RANGE else None
     ranges = device.upload(np.array([0, count], np.uint32))
     range_count, node_count, pack_count = 1, 0, 0
     nodes, packs, levels = [], [], [0]
     while range_count:
-        capacity = leaf_size * 8 ** (layout.BVH_MAX_DEPTH - len(levels))
+        capacity = min(leaf_size * 8 ** (layout.BVH_MAX_DEPTH - len(levels)), 0xFFFFFFFF)
         level = _Level(device, range_count, leaf_size)
-        offsets, inner, leaves = level.split(boxes, ranges, min(capacity, 0xFFFFFFFF))
+        level.split(boxes, ranges, capacity)
+        if splitter is not None and not level.split_large(splitter, ranges, capacity):
+            splitter = None  # the ranges of further levels are smaller still
+        offsets, inner, leaves = level.sum_up()
         node_count += range_count
         ranges = device.empty(inner * 8)
         nodes.append(level.nodes_array)
@@ -127,20 +136,50 @@ class _Level:
         self.device, self.count, self.leaf_size = device, count, leaf_size
         self.nodes = device.empty(count * layout.NODE.itemsize)
         self.children = device.empty(count * layout.BVH_WIDTH * 8)
+        self.counts = device.empty(count * 8)
         self.nodes_array = np.empty(count, layout.NODE)
 
-    def split(self, boxes: Any, ranges: Any, capacity: int) -> tuple[npt.NDArray[np.uint32], int, int]:
-        """Splits every range. Inner children and leaves before each node (count, 2), and the sums."""
-        device, count = self.device, self.count
-        counts = device.empty(count * 8)
-        sizes = np.uint32(count), np.uint32(self.leaf_size), np.uint32(capacity)
+    def split(self, boxes: Any, ranges: Any, capacity: int) -> None:
+        """Splits every range but those that are left to `split_large`."""
+        device = self.device
+        sizes = (np.uint32(n) for n in (self.count, self.leaf_size, capacity, LARGEST_SERIAL_RANGE))
+        buffers = boxes, ranges, self.nodes, self.children, self.counts
         kernel = device.kernel("split_ranges", _FILE)
         # Ranges differ in size by far: a group of its own for each spreads them best over the cores.
         group = 1 if device.is_cpu else None
-        device.launch(
-            kernel, count, *sizes, boxes, ranges, self.nodes, self.children, counts, work_group=group
-        )
-        sums = np.cumsum(device.read(counts, np.empty((count, 2), np.uint32)), axis=0, dtype=np.uint32)
+        device.launch(kernel, self.count, *sizes, *buffers, work_group=group)
+
+    def split_large(self, splitter: _Splitter, ranges: Any, capacity: int) -> bool:
+        """Splits the ranges that are too large for one work-item. False where there are none."""
+        device, count = self.device, self.count
+        sizes = device.read(ranges, np.empty((count, 2), np.uint32))
+        large = np.flatnonzero(sizes[:, 1] > LARGEST_SERIAL_RANGE)
+        if len(large) == 0:
+            return False
+        children = device.read(self.children, np.empty((count, layout.BVH_WIDTH, 2), np.uint32))
+        counts = device.read(self.counts, np.empty((count, 2), np.uint32))
+        device.read(self.nodes, self.nodes_array)
+        for i in large:
+            start, size = (int(n) for n in sizes[i])
+            parts = splitter.split(start, size, even=size > capacity)
+            leaves = sum(part.count <= self.leaf_size for part in parts)
+            children[i, : len(parts)] = [(part.start, part.count) for part in parts]
+            counts[i] = len(parts) - leaves, leaves
+            bounds = np.stack([part.bounds for part in parts], axis=1)
+            self.nodes_array[i]["bounds"][0::2, : len(parts)] = bounds[0:3]
+            self.nodes_array[i]["bounds"][1::2, : len(parts)] = -bounds[4:7]
+        for buffer, array in (
+            (self.children, children),
+            (self.counts, counts),
+            (self.nodes, self.nodes_array),
+        ):
+            device.write(buffer, array)
+        return True
+
+    def sum_up(self) -> tuple[npt.NDArray[np.uint32], int, int]:
+        """Inner children and leaves before each node (count, 2), and the sums of both."""
+        counts = self.device.read(self.counts, np.empty((self.count, 2), np.uint32))
+        sums = np.cumsum(counts, axis=0, dtype=np.uint32)
         offsets = np.concatenate([np.zeros((1, 2), np.uint32), sums[:-1]])
         return offsets, int(sums[-1, 0]), int(sums[-1, 1])
 
@@ -159,22 +198,119 @@ class _Level:
         packs_array = np.empty(leaves if self.leaf_size > 1 else 0, layout.TRIANGLE_PACK)
         packs = device.empty(packs_array.nbytes)
         sizes = (np.uint32(n) for n in (self.count, self.leaf_size, next_node, next_pack))
-        device.launch(
-            device.kernel("link_children", _FILE),
-            self.count,
-            *sizes,
-            boxes,
-            self.children,
-            device.upload(offsets),
-            self.nodes,
-            next_ranges,
-            packs,
-            *mesh,
-        )
+        buffers = boxes, self.children, device.upload(offsets), self.nodes, next_ranges, packs
+        device.launch(device.kernel("link_children", _FILE), self.count, *sizes, *buffers, *mesh)
         device.read(self.nodes, self.nodes_array)
         if len(packs_array):
             device.read(packs, packs_array)
         return packs_array
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A range of boxes; what surrounds them, and twice their centres, as a Box of cl/build_bvh.cl."""
+
+    start: int
+    count: int
+    bounds: npt.NDArray[np.float32]
+    centers: npt.NDArray[np.float32]
+
+
+class _Splitter:
+    """Splits ranges that are too large for one work-item: in chunks on the device, the plane chosen here."""
+
+    def __init__(self, device: Device, boxes: Any, leaf_size: int) -> None:
+        self.device, self.boxes, self.leaf_size = device, boxes, leaf_size
+        self.moved = device.empty(boxes.size)
+
+    def split(self, start: int, count: int, even: bool) -> list[_Part]:
+        """Up to eight parts of a range, found as `split_ranges` does it."""
+        parts = [self._measure(start, count)]
+        while len(parts) < layout.BVH_WIDTH:
+            sizes = [part.count if even else float(_area(part.bounds)) for part in parts]
+            candidates = [i for i, part in enumerate(parts) if part.count > self.leaf_size]
+            if not candidates:
+                break
+            chosen = max(candidates, key=sizes.__getitem__)
+            part = parts[chosen]
+            middle = part.start + (part.count // 2 if even else self._partition(part))
+            parts[chosen] = self._measure(part.start, middle - part.start)
+            parts.append(self._measure(middle, part.start + part.count - middle))
+        return parts
+
+    def _launch(self, name: str, count: int, *args: Any) -> None:
+        group = 1 if self.device.is_cpu else None
+        self.device.launch(self.device.kernel(name, _FILE), count, np.uint32(count), *args, work_group=group)
+
+    def _measure(self, start: int, count: int) -> _Part:
+        chunks = _chunks(start, count)
+        bounds = self.device.empty(len(chunks) * 64)
+        self._launch("measure_chunks", len(chunks), self.device.upload(chunks), self.boxes, bounds)
+        least = self.device.read(bounds, np.empty((len(chunks), 2, 8), np.float32)).min(axis=0)
+        return _Part(start, count, least[0], least[1])
+
+    def _partition(self, part: _Part) -> int:
+        """Reorders a part by the cheapest split; the number of boxes on its lower side."""
+        device = self.device
+        chunks = _chunks(part.start, part.count)
+        chunk_buffer = device.upload(chunks)
+        origin = part.centers[0:3]
+        extent = -part.centers[4:7] - origin
+        with np.errstate(divide="ignore"):
+            scale = np.float32(layout.BVH_BINS * 0.999) / extent
+        scale = np.where((extent > 0) & (scale < 1e30), scale, np.float32(0))
+        bins, counts = self._bin(chunk_buffer, len(chunks), origin, scale)
+        split = _cheapest_split(bins, counts.sum(axis=0, dtype=np.int64), self.leaf_size)
+        if split is None:
+            return part.count // 2  # all centres coincide: one order is as good as another
+        axis, position = split
+        left = counts[:, axis, :position].sum(axis=1, dtype=np.uint32)
+        lower = int(left.sum())
+        before = np.cumsum(left, dtype=np.uint32) - left
+        offsets = np.stack([part.start + before, lower + chunks[:, 0] - before], axis=1).astype(np.uint32)
+        numbers = np.uint32(axis), np.uint32(position), origin[axis], scale[axis]
+        buffers = chunk_buffer, device.upload(offsets), self.boxes, self.moved
+        self._launch("scatter_chunks", len(chunks), *numbers, *buffers)
+        self._launch("copy_chunks", len(chunks), chunk_buffer, self.moved, self.boxes)
+        return lower
+
+    def _bin(
+        self, chunks: Any, count: int, origin: npt.NDArray[np.float32], scale: npt.NDArray[np.float32]
+    ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.uint32]]:
+        """Boxes of the bins (3, bins, 8), and how many boxes each chunk put in them (count, 3, bins)."""
+        bin_buffer = self.device.empty(count * 3 * layout.BVH_BINS * 32)
+        count_buffer = self.device.empty(count * 3 * layout.BVH_BINS * 4)
+        self._launch("bin_chunks", count, *origin, *scale, chunks, self.boxes, bin_buffer, count_buffer)
+        bins = self.device.read(bin_buffer, np.empty((count, 3, layout.BVH_BINS, 8), np.float32))
+        counts = self.device.read(count_buffer, np.empty((count, 3, layout.BVH_BINS), np.uint32))
+        return bins.min(axis=0), counts
+
+
+def _chunks(start: int, count: int) -> npt.NDArray[np.uint32]:
+    """(chunks, 2) start and size of equal pieces of a range."""
+    edges = np.linspace(start, start + count, -(-count // CHUNK) + 1).astype(np.uint32)
+    return np.stack([edges[:-1], np.diff(edges)], axis=1)
+
+
+def _area(box: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Half the surface of boxes (..., 8): lower bounds first, then the negated upper ones."""
+    size = -box[..., 4:7] - box[..., 0:3]
+    area: npt.NDArray[np.float32] = (size * np.roll(size, 1, axis=-1)).sum(axis=-1)
+    return area
+
+
+def _cheapest_split(
+    bins: npt.NDArray[np.float32], counts: npt.NDArray[np.int64], leaf_size: int
+) -> tuple[int, int] | None:
+    """Axis and first bin of the upper side, by the surface area heuristic; None where nothing separates."""
+    lower, upper = counts.cumsum(axis=1)[:, :-1], counts[:, ::-1].cumsum(axis=1)[:, ::-1][:, 1:]
+    lower_box = np.minimum.accumulate(bins, axis=1)[:, :-1]
+    upper_box = np.minimum.accumulate(bins[:, ::-1], axis=1)[:, ::-1][:, 1:]
+    with np.errstate(invalid="ignore"):  # an empty side has an infinite box
+        cost = _area(lower_box) * -(-lower // leaf_size) + _area(upper_box) * -(-upper // leaf_size)
+    cost = np.where((lower > 0) & (upper > 0), cost, np.inf)
+    axis, position = np.unravel_index(cost.argmin(), cost.shape)
+    return (int(axis), int(position) + 1) if np.isfinite(cost[axis, position]) else None
 
 
 def _root_bounds(nodes: npt.NDArray[np.void]) -> npt.NDArray[np.float32]:

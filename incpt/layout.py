@@ -20,6 +20,8 @@ BVH_WIDTH = 8
 
 BVH_MAX_DEPTH = 16
 """Levels of a tree at most: the builder keeps to it, traversal sizes its stack by it."""
+BVH_BINS = 32
+"""Places along each axis where the builder may split."""
 
 NODE_EMPTY = 0xFFFFFFFF
 """Child reference of an unused place in a node (its box is inverted, so that no ray enters it)."""

@@ -246,12 +246,38 @@ def test_equal_faces_are_split_evenly(device: Device) -> None:
     assert check_tree(tree, face_boxes(mesh), is_mesh=True) <= 4
 
 
-def test_depth_is_bounded(device: Device) -> None:
-    # Each triangle is twice as far out as the one before: the heuristic alone cuts off one at a time.
+def nested_triangles() -> scene.Mesh:
+    # Each group is twice as far out as the one before: the heuristic alone cuts off one at a time.
     scale = np.ldexp(1.0, np.arange(-100, 29)).repeat(40)[:, None, None]
     corners = np.array([[1, 0, 0], [1.1, 0, 0], [1, 0.1, 0]]) * scale
-    mesh = scene.Mesh(corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(-1, 3))
+    return scene.Mesh(corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(-1, 3))
+
+
+def test_depth_is_bounded(device: Device) -> None:
+    mesh = nested_triangles()
     check_tree(bvh.build_mesh(device, mesh), face_boxes(mesh), is_mesh=True)
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        soup(np.random.default_rng(4), 5000),
+        scene.shape("sphere"),
+        nested_triangles(),
+        scene.Mesh(np.eye(3), np.tile([0, 1, 2], (1000, 1))),
+    ],
+    ids=["soup", "sphere", "nested", "equal"],
+)
+def test_large_ranges_are_split_alike(
+    device: Device, mesh: scene.Mesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    serial = bvh.build_mesh(device, mesh)
+    monkeypatch.setattr(bvh, "LARGEST_SERIAL_RANGE", 100)
+    monkeypatch.setattr(bvh, "CHUNK", 64)
+    chunked = bvh.build_mesh(device, mesh)
+    check_tree(chunked, face_boxes(mesh), is_mesh=True)
+    assert len(chunked.nodes) == pytest.approx(len(serial.nodes), rel=0.05)
+    np.testing.assert_array_equal(chunked.bounds, serial.bounds)
 
 
 def test_memory_per_triangle(device: Device) -> None:
@@ -458,8 +484,7 @@ def test_axis_parallel_rays_are_watertight(device: Device, name: str) -> None:
 
 
 def test_axis_parallel_rays_in_box_planes(device: Device) -> None:
-    # A pyramid stood on its base and its mirror image: rays along the axes through the shared apex and base
-    # corners lie exactly in planes of boxes.
+    # Rays straight down on every vertex of a grid: each lies in planes of the boxes around it.
     grid = np.stack(np.meshgrid(*[np.arange(-4, 5)] * 2), axis=-1).reshape(-1, 2)
     low = [[x, 0.0, z] for x, z in grid]
     faces = []
