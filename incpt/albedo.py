@@ -28,7 +28,7 @@ def table() -> npt.NDArray[np.float64]:
     grid = np.linspace(0.0, 1.0, ALBEDO_TABLE_SIZE)
     alpha = np.maximum(grid**2, MIN_ALPHA)[:, None, None]
     cosine = np.maximum(grid, 1e-3)[None, :, None]
-    # A golden-ratio lattice: a grid resolves the edge where reflections sink below the surface ten times worse.
+    # A golden-ratio lattice; a grid resolves the edge where reflections sink below the surface far worse.
     index = np.arange(_SAMPLES)[None, None, :]
     u, v = index * ((5**0.5 - 1) / 2) % 1, (index + 0.5) / _SAMPLES
     wo = np.broadcast_arrays(np.sqrt(1 - cosine**2), 0.0, cosine)
