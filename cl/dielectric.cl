@@ -60,7 +60,8 @@ INLINE BsdfValue eval_rough_boundary(const Boundary *b, Vec3 wo, Vec3 wi) {
     float lambda_i = 0.5f * (sqrt(a2 + (1.0f - a2) * mu_i * mu_i) / mu_i - 1.0f);
     // Smith masking correlates with height on one side of the surface only; across it both maskings
     // hold at once with Beta(1 + lambda_o, 1 + lambda_i), for which G1 G1 is the usual stand-in.
-    float g2 = reflects ? 1.0f / (1.0f + lambda_o + lambda_i) : 1.0f / ((1.0f + lambda_o) * (1.0f + lambda_i));
+    float g2 =
+        reflects ? 1.0f / (1.0f + lambda_o + lambda_i) : 1.0f / ((1.0f + lambda_o) * (1.0f + lambda_i));
     float visible_pdf = d * o_h / (wo.z * (1.0f + lambda_o));
     float f = boundary_reflectance(b, o_h);
     if (reflects) {

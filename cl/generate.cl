@@ -27,8 +27,7 @@ __kernel void generate(const Params params, __global const Slot *slots, __global
     int center = params.pixel_center != 0u;
     Vec3 direction = camera_direction(&params, (float)x + (center ? 0.5f : jitter.u),
                                       (float)y + (center ? 0.5f : jitter.v));
-    Vec3 position =
-        vec3(params.camera.position[0], params.camera.position[1], params.camera.position[2]);
+    Vec3 position = vec3(params.camera.position[0], params.camera.position[1], params.camera.position[2]);
 
     __global uint *bits = (__global uint *)paths;
     store3(rays + RAY_ORIGIN_X * stride, stride, path, position);

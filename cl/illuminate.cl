@@ -6,9 +6,8 @@
 __kernel void illuminate(const Params params, const uint count, __global const uint *list,
                          __global const float *lights, __global const float *environment_image,
                          __global const float *environment_marginal,
-                         __global const float *environment_conditional,
-                         __global const float *environment_pdf, __global const float *hits,
-                         __global const float *paths, __global float *shadows) {
+                         __global const float *environment_conditional, __global const float *environment_pdf,
+                         __global const float *hits, __global const float *paths, __global float *shadows) {
     uint stride = params.path_stride;
     uint item = (uint)get_global_id(0);
     uint path = item < count ? list[item] : stride - 1u;

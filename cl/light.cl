@@ -76,8 +76,7 @@ INLINE float environment_pdf(const Params *params, const Emitters *emitters, Uni
 
 // Radiance that arrives from far away along -direction, and the density with which light sampling would
 // have chosen the direction (0: never).
-INLINE Vec3 eval_environment(const Params *params, const Emitters *emitters, Vec3 direction,
-                                    float *pdf) {
+INLINE Vec3 eval_environment(const Params *params, const Emitters *emitters, Vec3 direction, float *pdf) {
     Vec3 color =
         vec3(params->environment_color[0], params->environment_color[1], params->environment_color[2]);
 #ifdef ENVIRONMENT_IMAGE
@@ -113,7 +112,7 @@ INLINE LightSample sample_environment(const Params *params, const Emitters *emit
 #ifdef TRIANGLE_LIGHTS
 // `choice` picks the triangle (Walker's alias method), `uv` the point on it.
 INLINE LightSample sample_triangle_light(const Params *params, const Emitters *emitters, Vec3 position,
-                                                Uniform2 uv, float choice) {
+                                         Uniform2 uv, float choice) {
     uint stride = params->light_count;
     __global const float *lights = emitters->lights;
     float scaled_choice = choice * (float)stride;
@@ -145,8 +144,8 @@ INLINE LightSample sample_triangle_light(const Params *params, const Emitters *e
 
 #ifdef LIGHT_SAMPLING
 // One direction towards a light, chosen by power among triangles and the environment.
-INLINE LightSample sample_light(const Params *params, const Emitters *emitters, Vec3 position,
-                                       Uniform2 uv, float choice) {
+INLINE LightSample sample_light(const Params *params, const Emitters *emitters, Vec3 position, Uniform2 uv,
+                                float choice) {
 #if defined(ENVIRONMENT_IMAGE) && defined(TRIANGLE_LIGHTS)
     float p = params->environment_probability;
     int far = choice < p;
@@ -170,7 +169,7 @@ INLINE LightSample sample_light(const Params *params, const Emitters *emitters, 
 // Radiance that a hit surface emits towards the ray's origin, weighted against light sampling, which would
 // have found the point with the material's area density. bsdf_pdf 0: nobody else could have found it.
 INLINE Vec3 emitted_radiance(__global const Material *material, float facing, float distance,
-                                    float bsdf_pdf) {
+                             float bsdf_pdf) {
     int shines = ((material->flags & MATERIAL_DOUBLE_SIDED) != 0u) | (facing > 0.0f);
     float light_pdf = material->light_pdf * distance * distance / MAX(FABS(facing), 1e-7f);
     float weight = bsdf_pdf > 0.0f ? mis_weight(MAX(bsdf_pdf, 1e-30f), light_pdf) : 1.0f;

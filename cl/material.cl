@@ -15,9 +15,9 @@
 #define MIN_ALPHA 1e-3f
 
 typedef struct {
-    Vec3 base;     // albedo of the Lambertian part, without the layer's share
-    Vec3 f0, f90;  // specular reflectance at normal and at grazing incidence
-    float alpha;   // GGX roughness
+    Vec3 base;    // albedo of the Lambertian part, without the layer's share
+    Vec3 f0, f90; // specular reflectance at normal and at grazing incidence
+    float alpha;  // GGX roughness
     float metallic;
     __global const float *layer; // E at ALBEDO_TABLE_SIZE cosines from 0 to 1, then 1 / (1 - E_avg)
 } Surface;
@@ -105,6 +105,7 @@ INLINE BsdfSample sample_surface(const Surface *s, Vec3 wo, Uniform2 direction, 
     BsdfSample result;
     result.wi = wi;
     result.pdf = value.pdf;
-    result.weight = choose(valid, scaled(1.0f / (valid ? value.pdf : 1.0f), value.f_cos), vec3(0.0f, 0.0f, 0.0f));
+    result.weight =
+        choose(valid, scaled(1.0f / (valid ? value.pdf : 1.0f), value.f_cos), vec3(0.0f, 0.0f, 0.0f));
     return result;
 }

@@ -19,8 +19,7 @@ INLINE MediumStack load_medium_stack(__global const uint *path_bits, uint stride
     return stack;
 }
 
-INLINE void store_medium_stack(__global uint *path_bits, uint stride, uint path,
-                                      const MediumStack *stack) {
+INLINE void store_medium_stack(__global uint *path_bits, uint stride, uint path, const MediumStack *stack) {
     path_bits[PATH_MEDIUM_0 * stride + path] = stack->entry[0] | (stack->entry[1] << 16);
     path_bits[PATH_MEDIUM_1 * stride + path] = stack->entry[2] | (stack->entry[3] << 16);
 }

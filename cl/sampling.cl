@@ -34,8 +34,8 @@ INLINE Vec3 sample_cosine_hemisphere(float u, float v) {
     return vec3(radius * cosine, radius * sine, SQRT(MAX(1.0f - u, 0.0f)));
 }
 
-// A microfacet normal that is visible from wo (wo.z > 0) on a GGX surface, density G1(wo) D(h) <wo, h> / wo.z.
-// J. Dupuy and A. Benyoub, Sampling Visible GGX Normals with Spherical Caps, HPG 2023.
+// A microfacet normal that is visible from wo (wo.z > 0) on a GGX surface, density G1(wo) D(h) <wo, h> /
+// wo.z. J. Dupuy and A. Benyoub, Sampling Visible GGX Normals with Spherical Caps, HPG 2023.
 INLINE Vec3 sample_visible_normal(Vec3 wo, float alpha, float u, float v) {
     Vec3 stretched = unit(vec3(alpha * wo.x, alpha * wo.y, wo.z));
     float sine, cosine;

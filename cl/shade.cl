@@ -5,14 +5,13 @@
 //
 //   L_o(wo) = L_e(wo) + integral of f(wo, wi) L_i(wi) cos(wi) d wi
 //
-// with the integral estimated by light sampling (`illuminate` has chosen a light) and by BSDF sampling (the next ray, whose
-// emission counts at its end), combined by multiple importance sampling. Straight-line code of scalars, so
-// that PoCL runs it in SIMD lanes.
+// with the integral estimated by light sampling (`illuminate` has chosen a light) and by BSDF sampling (the
+// next ray, whose emission counts at its end), combined by multiple importance sampling. Straight-line code
+// of scalars, so that PoCL runs it in SIMD lanes.
 __kernel void shade(const Params params, const uint count, __global const uint *list,
                     __global const Material *materials, __global const float *layers,
                     __global const float *lights, __global const float *environment_image,
-                    __global const float *environment_marginal,
-                    __global const float *environment_conditional,
+                    __global const float *environment_marginal, __global const float *environment_conditional,
                     __global const float *environment_pdf, __global const float *hits, __global float *rays,
                     __global float *paths, __global float *shadows, __global float *radiance) {
     uint stride = params.path_stride;
@@ -77,7 +76,8 @@ __kernel void shade(const Params params, const uint count, __global const uint *
     Vec3 to_light = load3(shadows + SHADOW_DIRECTION_X * stride, stride, path);
     float light_pdf = shadows[SHADOW_PDF * stride + path];
     BsdfValue towards_light = eval_surface(&surface, wo, to_local(frame, to_light));
-    int lit = scatters & (light_pdf > 0.0f) & (towards_light.pdf > 0.0f) & (inner(geometric, to_light) > 0.0f);
+    int lit =
+        scatters & (light_pdf > 0.0f) & (towards_light.pdf > 0.0f) & (inner(geometric, to_light) > 0.0f);
     light_pdf = lit ? light_pdf : 1.0f;
     float light_weight = mis_weight(light_pdf, towards_light.pdf) / light_pdf;
     Vec3 arriving = load3(shadows + SHADOW_RADIANCE_R * stride, stride, path);

@@ -17,13 +17,15 @@ import numpy.typing as npt
 from incpt.layout import ALBEDO_TABLE_SIZE
 from incpt.scene import Material
 
+Array = npt.NDArray[np.floating]
+
 _SAMPLES = 1024
 MIN_ALPHA = 1e-3
 """Least GGX alpha of an opaque surface, as in cl/material.cl."""
 
 
 @lru_cache(maxsize=1)
-def table() -> npt.NDArray[np.float64]:
+def table() -> Array:
     """(2, roughness, cosine) A and B at ALBEDO_TABLE_SIZE roughnesses and cosines from 0 to 1."""
     grid = np.linspace(0.0, 1.0, ALBEDO_TABLE_SIZE)
     alpha = np.maximum(grid**2, MIN_ALPHA)[:, None, None]
@@ -36,7 +38,7 @@ def table() -> npt.NDArray[np.float64]:
     o_h = sum(a * b for a, b in zip(wo, h, strict=True))
     mu_i = 2 * o_h * h[2] - cosine
 
-    def lambda_(mu: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def lambda_(mu: Array) -> Array:
         mu2 = np.clip(mu, 1e-6, 1.0) ** 2
         return np.asarray((np.sqrt(1 + alpha**2 * (1 - mu2) / mu2) - 1) / 2)
 
@@ -47,11 +49,11 @@ def table() -> npt.NDArray[np.float64]:
 
 
 def _visible_normal(
-    wo: Sequence[npt.NDArray[np.float64]],
-    alpha: npt.NDArray[np.float64],
-    u: npt.NDArray[np.float64],
-    v: npt.NDArray[np.float64],
-) -> list[npt.NDArray[np.float64]]:
+    wo: Sequence[Array],
+    alpha: Array,
+    u: Array,
+    v: Array,
+) -> list[Array]:
     # Dupuy and Benyoub 2023, as sample_visible_normal in cl/sampling.cl.
     x, y, z = alpha * wo[0], alpha * wo[1], wo[2]
     length = np.sqrt(x * x + y * y + z * z)

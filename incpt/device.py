@@ -56,7 +56,9 @@ class Device:
             self.context = cl.Context([self.cl_device])
             self.queue = cl.CommandQueue(self.context)
         except cl.Error as error:
-            raise DeviceError(f"device {self.name!r} cannot be opened: {error}; try another --device") from error
+            raise DeviceError(
+                f"device {self.name!r} cannot be opened: {error}; try another --device"
+            ) from error
         self._kernels: dict[tuple[str, tuple[str, ...]], cl.Kernel] = {}
 
     @property
@@ -102,8 +104,8 @@ class Device:
         limit = self.cl_device.max_mem_alloc_size
         if nbytes > limit:
             raise DeviceError(
-                f"device memory: one buffer of {nbytes / 2**20:,.0f} MiB is over the {limit / 2**20:,.0f} MiB "
-                f"that {self.name} allows; use a smaller image or scene"
+                f"device memory: one buffer of {nbytes / 2**20:,.0f} MiB is over the "
+                f"{limit / 2**20:,.0f} MiB that {self.name} allows; use a smaller image or scene"
             )
         try:
             return cl.Buffer(self.context, cl.mem_flags.READ_WRITE, nbytes)
@@ -134,7 +136,10 @@ class Device:
 
     def fill(self, buffer: cl.Buffer, value: int, nbytes: int, offset: int = 0) -> None:
         """Set `nbytes` of `buffer` to the 32-bit pattern `value`."""
-        cl.enqueue_fill_buffer(self.queue, buffer, np.uint32(value), offset, nbytes)
+        try:
+            cl.enqueue_fill_buffer(self.queue, buffer, np.array(value, np.uint32), offset, nbytes)
+        except cl.Error as error:
+            raise DeviceError(_explain(error, "a fill")) from error
 
     def finish(self) -> None:
         """Wait until everything that was enqueued is done."""
@@ -143,17 +148,24 @@ class Device:
         except cl.Error as error:
             raise DeviceError(_explain(error, "the device")) from error
 
-    def _build(self, file: str, features: tuple[str, ...]) -> cl.Program:
+    def program_text(self, file: str, features: tuple[str, ...] = ()) -> str:
+        """The whole source of cl/`file`.cl as this device builds it."""
         # The target is part of the source, so that a kernel cached for another processor is not taken.
         names = [*features, *(["INCPT_POCL"] if self.is_pocl else [])]
         defines = "".join(f"#define {name}\n" for name in names)
-        text = f"// target: {self.target}\n{defines}{layout.c_header()}\n{source(file)}"
+        return f"// target: {self.target}\n{defines}{layout.c_header()}\n{source(file)}"
+
+    def _build(self, file: str, features: tuple[str, ...]) -> cl.Program:
+        text = self.program_text(file, features)
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", cl.CompilerWarning)
-                return cl.Program(self.context, text).build(options=_BUILD_OPTIONS)
+                program: cl.Program = cl.Program(self.context, text).build(options=_BUILD_OPTIONS)
+                return program
         except cl.Error as error:
-            raise DeviceError(f"cl/{file}.cl does not build on {self.name}: {_first_error(str(error))}") from error
+            raise DeviceError(
+                f"cl/{file}.cl does not build on {self.name}: {_first_error(str(error))}"
+            ) from error
 
 
 def source(file: str, included: set[str] | None = None) -> str:
@@ -218,7 +230,9 @@ def choose(choice: str | int | None = None) -> cl.Device:
 
 def _explain(error: cl.Error, what: str) -> str:
     text = str(error)
-    if any(word in text for word in ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES", "OUT_OF_HOST_MEMORY")):
+    if any(
+        word in text for word in ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES", "OUT_OF_HOST_MEMORY")
+    ):
         return f"device memory ran out for {what}; use a smaller image or scene, or another --device"
     return f"{what} failed: {text.splitlines()[0]}"
 

@@ -7,7 +7,8 @@ camera travels with the parameters of every launch.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -191,6 +192,6 @@ _PARTS: tuple[tuple[str, Callable[[Change], bool]], ...] = (
 )
 
 
-def _joined(arrays: list[npt.NDArray[np.generic]], dtype: np.dtype) -> npt.NDArray[np.generic]:
+def _joined(arrays: Sequence[npt.NDArray[Any]], dtype: np.dtype[Any]) -> npt.NDArray[Any]:
     # A kernel argument needs a buffer even where nobody reads it.
     return np.concatenate(arrays) if arrays else np.zeros(1, dtype)

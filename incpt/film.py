@@ -29,9 +29,7 @@ class Film:
         device.fill(self._sums, 0, nbytes)
         device.fill(self._nonfinite, 0, 4)
 
-    def reduce(
-        self, params: npt.NDArray[np.void], plan: Plan, slots: cl.Buffer, radiance: cl.Buffer
-    ) -> None:
+    def reduce(self, params: npt.NDArray[np.void], plan: Plan, slots: cl.Buffer, radiance: cl.Buffer) -> None:
         """Put the paths of a step, `radiance` in the order of its `slots`, into the film."""
         groups = np.unique(plan.slots["group_first"]).astype(np.uint32)
         size = len(groups) * int(params["tile_size"]) ** 2

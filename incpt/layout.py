@@ -12,6 +12,7 @@ work-items then touch neighbouring floats, which GPUs coalesce and PoCL vectoris
 from __future__ import annotations
 
 from enum import IntEnum, IntFlag
+from typing import Any
 
 import numpy as np
 
@@ -174,7 +175,7 @@ class MaterialFlag(IntFlag):
     EMISSIVE = 4
 
 
-def _packed(fields: list[tuple[str, type] | tuple[str, type, tuple[int, ...]]]) -> np.dtype:
+def _packed(fields: list[Any]) -> np.dtype[np.void]:
     return np.dtype(fields, align=False)
 
 
@@ -280,7 +281,7 @@ PARAMS = _packed(
     ]
 )
 
-STRUCTS: dict[str, np.dtype] = {
+STRUCTS: dict[str, np.dtype[np.void]] = {
     "Node": NODE,
     "TrianglePack": TRIANGLE_PACK,
     "Object": OBJECT,
@@ -293,7 +294,7 @@ STRUCTS: dict[str, np.dtype] = {
 _C_TYPES = {np.dtype(np.float32): "float", np.dtype(np.int32): "int", np.dtype(np.uint32): "uint"}
 
 
-def _c_field(name: str, dtype: np.dtype) -> str:
+def _c_field(name: str, dtype: np.dtype[Any]) -> str:
     base, shape = dtype.subdtype if dtype.subdtype is not None else (dtype, ())
     for struct_name, struct in STRUCTS.items():
         if base == struct:
@@ -304,7 +305,7 @@ def _c_field(name: str, dtype: np.dtype) -> str:
     return f"    {c_type} {name}{''.join(f'[{n}]' for n in shape)};"
 
 
-def _c_struct(name: str, dtype: np.dtype) -> str:
+def _c_struct(name: str, dtype: np.dtype[np.void]) -> str:
     assert dtype.names is not None and dtype.fields is not None
     lines = [_c_field(field, dtype.fields[field][0]) for field in dtype.names]
     body = "\n".join(lines)

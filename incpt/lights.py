@@ -25,14 +25,15 @@ def radiant_weight(material: Material) -> float:
 
 @dataclass(frozen=True, eq=False)
 class TriangleLights:
-    """`planes` (len(LightPlane), N) float32 (uints bit for bit); `total`: sum of area times `radiant_weight`."""
+    """`planes` (len(LightPlane), N) float32, uints bit for bit; `total` is the sum of area times
+    `radiant_weight`."""
 
     planes: npt.NDArray[np.float32]
     total: float
 
     @property
     def count(self) -> int:
-        return self.planes.shape[1]
+        return int(self.planes.shape[1])
 
 
 def triangle_lights(scene: Scene, share: float) -> TriangleLights:
@@ -52,7 +53,13 @@ def triangle_lights(scene: Scene, share: float) -> TriangleLights:
         double_sided.append(np.full(len(faces), material.double_sided))
     if not corners:
         return TriangleLights(np.zeros((len(layout.LightPlane), 0), np.float32), 0.0)
-    return _triangle_planes(*map(np.concatenate, (corners, emission, weights, double_sided)), share)
+    return _triangle_planes(
+        np.concatenate(corners),
+        np.concatenate(emission),
+        np.concatenate(weights),
+        np.concatenate(double_sided),
+        share,
+    )
 
 
 def _triangle_planes(
@@ -83,7 +90,8 @@ def _triangle_planes(
 def alias_table(
     weights: npt.NDArray[np.floating],
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.uint32]]:
-    """Walker's alias table by Vose's method (1991): cell i keeps i with probability[i], else gives alias[i]."""
+    """Walker's alias table by Vose's method (1991): cell i stands for i with probability[i], else for
+    alias[i]."""
     count = len(weights)
     scaled = (np.asarray(weights, np.float64) * (count / np.sum(weights))).tolist()
     probability, alias = np.ones(count, np.float32), np.arange(count, dtype=np.uint32)

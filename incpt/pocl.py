@@ -29,7 +29,8 @@ _LEVELS = (
     ("x86-64-v2", {"cx16", "popcnt", "sse4_1", "sse4_2", "ssse3"}),
 )
 
-_names_in_use: list[Any] = []  # PoCL keeps pointers into these for the life of the process
+# By address of the device; PoCL keeps pointers into the texts for the life of the process.
+_targets: dict[int, Any] = {}
 
 
 def name_target(cl_device: Any) -> str | None:
@@ -39,13 +40,15 @@ def name_target(cl_device: Any) -> str | None:
     """
     if "pocl" not in cl_device.platform.version.lower() or not Path("/proc/self/mem").exists():
         return None
-    places = _pointers_to_unknown(cl_device.int_ptr)
-    if len(places) != 1:
-        return None
-    name = target_name(_cpu_flags())
-    text = ctypes.create_string_buffer(name.encode())
-    _names_in_use.append(text)
-    ctypes.c_void_p.from_address(places[0]).value = ctypes.addressof(text)
+    address = cl_device.int_ptr
+    if address not in _targets:
+        places = _pointers_to_unknown(address)
+        if len(places) != 1:
+            return None
+        text = ctypes.create_string_buffer(target_name(_cpu_flags()).encode())
+        ctypes.c_void_p.from_address(places[0]).value = ctypes.addressof(text)
+        _targets[address] = text
+    name: str = _targets[address].value.decode()
     return name
 
 

@@ -87,6 +87,7 @@ class Session:
         self.device = device if isinstance(device, Device) else Device(device)
         self._wavefront = Wavefront(self.device)
         self._device_scene = DeviceScene(self.device, scene)
+        self._cursor = tiles.Cursor()
         self._start_film()
 
     @property
@@ -135,7 +136,13 @@ class Session:
         if tiles.is_done(queue, plan.cursor):
             self._enter(next_mode(mode, Event.QUEUE_DONE, self.settings.strategy))
         return StepReport(
-            mode, plan.finished, plan.cursor.tiles, len(queue.tiles), paths, time.perf_counter() - start, nonfinite
+            mode,
+            plan.finished,
+            plan.cursor.tiles,
+            len(queue.tiles),
+            paths,
+            time.perf_counter() - start,
+            nonfinite,
         )
 
     def edit(self, scene: Scene, pixel: tuple[float, float] | None = None) -> Change:
@@ -207,7 +214,8 @@ class Session:
         tile_count = self._grid.count
         queue = tiles.Queue(tiles.base_queue(self._grid), 1, True)
         surface, object_ids = self._first_hits(
-            tiles.plan(self._grid, queue, tiles.Cursor(), tile_count, self._tile_spp).slots, self._params(tile_count)
+            tiles.plan(self._grid, queue, tiles.Cursor(), tile_count, self._tile_spp).slots,
+            self._params(tile_count),
         )
         surface = surface.reshape(7, height, width)
         return Aovs(
@@ -285,7 +293,9 @@ class Session:
         """Centre of the 2D bounding box of objects, of its visible part where there is one, in pixels."""
         width, height = self.size
         camera = self.scene.camera
-        frame = transform.camera_frame(camera.position, camera.target, camera.up, camera.fov_y, width / height)
+        frame = transform.camera_frame(
+            camera.position, camera.target, camera.up, camera.fov_y, width / height
+        )
         corners = np.concatenate([transform.box_corners(obj.world_bounds) for obj in objects])
         pixels, in_front = transform.project(corners, camera.position, frame, self.size)
         if not in_front.any():
@@ -331,5 +341,3 @@ def affected_objects(old: Scene, new: Scene, change: Change) -> list[Object]:
         for obj in scene.objects
         if obj.visible and (obj.name in names or obj.material in change.materials)
     ]
-
-

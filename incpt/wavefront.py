@@ -40,9 +40,7 @@ class Wavefront:
         )
         for buffer in (self._rays, self._paths, self._hits, self._shadows):
             device.fill(buffer, 0, buffer.size)
-        self._live, self._next, self._first, self._second = (
-            device.empty(4 * self.stride) for _ in range(4)
-        )
+        self._live, self._next, self._first, self._second = (device.empty(4 * self.stride) for _ in range(4))
         self._counters = device.empty(8)
 
     def trace(
@@ -57,7 +55,9 @@ class Wavefront:
         planes of params["buffer_stride"] floats."""
         for first in range(0, path_count, self.chunk_paths):
             chunk = self._chunk_params(params, first, path_count)
-            self._launch("generate", self.chunk_paths_of(chunk), chunk, slots, self._rays, self._paths, radiance)
+            self._launch(
+                "generate", self.chunk_paths_of(chunk), chunk, slots, self._rays, self._paths, radiance
+            )
             count, _ = self._compact(chunk, self.chunk_paths_of(chunk), None, _Class.LIVE, self._live)
             for _ in range(_MOST_RAYS):
                 if count == 0:
@@ -128,8 +128,8 @@ class Wavefront:
 
     def _intersect(self, scene: DeviceScene, params: npt.NDArray[np.void], count: int) -> None:
         self._launch(
-            "intersect", count, params, np.uint32(count), self._live, *scene.geometry, scene.buffer("normals"),
-            self._rays, self._paths, self._hits,
+            "intersect", count, params, np.uint32(count), self._live, *scene.geometry,
+            scene.buffer("normals"), self._rays, self._paths, self._hits,
         )  # fmt: skip
 
     def _illuminate(self, scene: DeviceScene, params: npt.NDArray[np.void], count: int) -> None:
@@ -168,7 +168,7 @@ class Wavefront:
         source: cl.Buffer | None,
         first_bits: _Class,
         first: cl.Buffer,
-        second_bits: _Class = _Class(0),
+        second_bits: _Class | None = None,
         second: cl.Buffer | None = None,
         append: bool = False,
     ) -> tuple[int, int]:
@@ -177,7 +177,7 @@ class Wavefront:
             self.device.fill(self._counters, 0, 8)
         self._launch(
             "compact", -(-count // _COMPACT_BLOCK), params, np.uint32(count), np.uint32(source is None),
-            source or self._live, self._paths, np.uint32(first_bits), first, np.uint32(second_bits),
+            source or self._live, self._paths, np.uint32(first_bits), first, np.uint32(second_bits or 0),
             second or self._second, self._counters,
         )  # fmt: skip
         lengths = self.device.read(self._counters, np.empty(2, np.uint32))

@@ -28,7 +28,12 @@ def mixed_scene(**settings: object) -> Scene:
         "red": Material(base_color=(0.8, 0.1, 0.1)),
         "grey": Material(base_color=(0.5, 0.5, 0.5), roughness=0.5),
         "glass": Material(
-            base_color=(1, 1, 1), transmission=1.0, roughness=0.0, ior=1.5, priority=1, absorption=(0.5, 0.1, 0.2)
+            base_color=(1, 1, 1),
+            transmission=1.0,
+            roughness=0.0,
+            ior=1.5,
+            priority=1,
+            absorption=(0.5, 0.1, 0.2),
         ),
         "lamp": Material(base_color=(0, 0, 0), emission=(12, 11, 10)),
     }

@@ -1,7 +1,7 @@
 """The method's law: after any sequence of edits the converged picture is that of a fresh render.
 
-A sample depends on (pixel, index, seed) alone, and every edit ends with each tile holding samples 0 to n - 1 of
-the scene as it is. So the law can be tested far below the noise: with the same counts, the same samples.
+A sample depends on (pixel, index, seed) alone, and every edit ends with each tile holding samples 0 to n - 1
+of the scene as it is. So the law can be tested far below the noise: with the same counts, the same samples.
 """
 
 from __future__ import annotations
@@ -69,7 +69,9 @@ edits = st.one_of(
     st.builds(lambda n, v: on_object(n, scale=v), names, scales),
     st.builds(lambda n, v: on_object(n, visible=v), names, st.booleans()),
     st.builds(lambda n, m: on_object(n, material=m), names, material_names),
-    st.builds(lambda n, m: on_object(n, mesh=shape(m)), names, st.sampled_from(["cube", "cylinder", "plane"])),
+    st.builds(
+        lambda n, m: on_object(n, mesh=shape(m)), names, st.sampled_from(["cube", "cylinder", "plane"])
+    ),
     st.builds(removed, names),
     st.builds(added, vectors, st.sampled_from(["cube", "sphere"]), material_names),
     st.builds(deformed, names, unit),
@@ -97,7 +99,9 @@ def apply_all(
 
 
 @hypothesis_settings(
-    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+    max_examples=25,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 @given(
     st.sampled_from(["spiral", "restart"]),
@@ -114,7 +118,9 @@ def test_edits_then_convergence_equal_a_fresh_render(
     assert session.mode is Mode.REFINE
     counts = np.unique(spp)
     image = session.image()
-    fresh = Session(scene, size=(20, 14), settings=replace(scene.settings, slots_per_step=None), device=device)
+    fresh = Session(
+        scene, size=(20, 14), settings=replace(scene.settings, slots_per_step=None), device=device
+    )
     for count in range(NOR, int(counts[-1]) + 1, NOR):
         fresh.render(count)
         here = spp == count
@@ -123,7 +129,9 @@ def test_edits_then_convergence_equal_a_fresh_render(
 
 
 @pytest.mark.parametrize("strategy", ["spiral", "restart"])
-def test_edits_then_convergence_equal_a_fresh_render_with_other_numbers(device: Device, strategy: str) -> None:
+def test_edits_then_convergence_equal_a_fresh_render_with_other_numbers(
+    device: Device, strategy: str
+) -> None:
     # Within noise, as the law says it: the fresh render has another seed.
     sequence = [
         (on_object("red cube", position=(0.4, 0.6, 0.2)), 1),

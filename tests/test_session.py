@@ -162,7 +162,9 @@ def test_edit_during_incremental_starts_a_new_spiral(device: Device) -> None:
     assert x < 16
 
 
-@pytest.mark.parametrize("edit", [lambda s: s.with_camera(fov_y=50.0), lambda s: s.with_environment(intensity=1.0)])
+@pytest.mark.parametrize(
+    "edit", [lambda s: s.with_camera(fov_y=50.0), lambda s: s.with_environment(intensity=1.0)]
+)
 def test_global_change_starts_over(device: Device, edit) -> None:
     session = rendered(device, mixed_scene(slots_per_step=8), 2)
     before = session.image()
@@ -237,7 +239,9 @@ def test_settings_of_the_picture_start_over(device: Device, name: str) -> None:
     session.configure(replace(session.settings, **{name: getattr(session.settings, name) + 1}))
     assert session.mode is Mode.BASE
     session.render(2)
-    assert_same(session.image(), rendered(device, mixed_scene(), 2, **{name: getattr(session.settings, name)}).image())
+    assert_same(
+        session.image(), rendered(device, mixed_scene(), 2, **{name: getattr(session.settings, name)}).image()
+    )
 
 
 def test_settings_of_the_method_keep_the_picture(device: Device) -> None:
