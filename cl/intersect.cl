@@ -109,11 +109,13 @@ BVH_CALL void write_hit(const BvhHit *hit, uint k, uint stride, __global const O
     }
 }
 
-__kernel void intersect(const Params params, const uint count, __global const uint *list,
-                        __global const Node *top_nodes, __global const Node *nodes,
-                        __global const TrianglePack *packs, __global const Object *objects,
-                        __global const Material *materials, __global const float *normals,
-                        __global const float *rays, __global float *paths, __global float *hits) {
+// The hint keeps compilers from making SIMD lanes of work-items (Intel's would): the lanes are boxes and
+// triangles.
+__kernel __attribute__((vec_type_hint(float8))) void
+intersect(const Params params, const uint count, __global const uint *list, __global const Node *top_nodes,
+          __global const Node *nodes, __global const TrianglePack *packs, __global const Object *objects,
+          __global const Material *materials, __global const float *normals, __global const float *rays,
+          __global float *paths, __global float *hits) {
     if (get_global_id(0) >= count)
         return;
     const uint k = list[get_global_id(0)], stride = params.path_stride;

@@ -163,11 +163,13 @@ class _Level:
             start, size = (int(n) for n in sizes[i])
             parts = splitter.split(start, size, even=size > capacity)
             leaves = sum(part.count <= self.leaf_size for part in parts)
+            children[i] = 0
             children[i, : len(parts)] = [(part.start, part.count) for part in parts]
             counts[i] = len(parts) - leaves, leaves
-            bounds = np.stack([part.bounds for part in parts], axis=1)
-            self.nodes_array[i]["bounds"][0::2, : len(parts)] = bounds[0:3]
-            self.nodes_array[i]["bounds"][1::2, : len(parts)] = -bounds[4:7]
+            bounds = np.full((8, layout.BVH_WIDTH), np.inf, np.float32)
+            bounds[:, : len(parts)] = np.stack([part.bounds for part in parts], axis=1)
+            self.nodes_array[i]["bounds"][0::2] = bounds[0:3]
+            self.nodes_array[i]["bounds"][1::2] = -bounds[4:7]
         for buffer, array in (
             (self.children, children),
             (self.counts, counts),
