@@ -318,7 +318,8 @@ def _padded_pixels(settings: RenderSettings) -> int:
 
 def _print_table(table: Table) -> None:
     console = Console()
-    console.print(table, width=None if console.is_terminal else 120)
+    # Without a terminal rich takes 80 columns, too few for a replay's table.
+    (console if console.is_terminal else Console(width=120)).print(table)
 
 
 def _parse_size(text: str) -> tuple[int, int]:
