@@ -84,7 +84,7 @@ __kernel void shade(const Params params, const uint count, __global const uint *
     arriving = times(times(throughput, towards_light.f_cos), scaled(light_weight, arriving));
     store3(shadows + SHADOW_ORIGIN_X * stride, stride, path, origin);
     store3(shadows + SHADOW_RADIANCE_R * stride, stride, path, arriving);
-    path_class = lit & (largest(arriving) > 0.0f) ? CLASS_SHADOW : 0u;
+    path_class = (lit & (largest(arriving) > 0.0f)) ? CLASS_SHADOW : 0u;
 #endif
 
     // BSDF sampling: the next ray.

@@ -221,3 +221,17 @@ def test_pocl_runs_shading_in_simd_lanes(device: Device, tmp_path: Path) -> None
         remarks[name] = remarks.get(name, "") + text
     for name in ("generate", "illuminate", "shade"):
         assert "vectorized loop (vectorization width: 8" in remarks[name], name
+
+
+def test_kernels_build_without_warnings(device: Device) -> None:
+    lights = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS")
+    variants = [(), lights[:1], lights[1:], lights]
+    for file in sorted(path.stem for path in (Path(layout.__file__).parent.parent / "cl").glob("*.cl")):
+        if "__kernel" not in source(file):
+            continue
+        for features in variants if "LIGHT_SAMPLING" in source(file) else [()]:
+            if file == "illuminate" and not features:
+                continue  # launched only where there is something to sample
+            program = cl.Program(device.context, device.program_text(file, features)).build(options=["-Werror"])
+            log = program.get_build_info(device.cl_device, cl.program_build_info.LOG)
+            assert "warning" not in log, (file, features, log)
