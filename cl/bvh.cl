@@ -4,7 +4,8 @@
 // function, a product compared with a product, cannot come out wrong as long as both are rounded alike, so a
 // ray that meets a shared edge or vertex is inside at least one of the faces there. Contracting one of the
 // products into a fused multiply-add would break that.
-// Box tests err on the side of a hit (Ize 2013, "Robust BVH Ray Traversal").
+// Box tests err on the side of a hit (Ize 2013, "Robust BVH Ray Traversal"): should huge coordinates along a
+// zero direction overflow to NaN, the order of operands in BVH_MIN8 and BVH_MAX8 drops that axis.
 
 #include "scalar.cl"
 
@@ -202,14 +203,14 @@ INLINE ulong bvh_entry(uint reference, float distance) {
 }
 
 // Pushes the children in `lanes` (one or more) but the nearest, which it returns, nearer ones above farther
-// ones. The place of a child is the number of those farther away: no comparison decides a branch.
+// ones. Of three or more, the place of each is the number of those farther away: no comparison decides a
+// branch there.
 INLINE uint bvh_push(__global const Node *node, uint lanes, const float8 entry, ulong *stack, uint *height) {
     const uint first = BVH_FIRST_BIT(lanes);
     uint left = lanes & (lanes - 1);
     if (!left)
         return node->child[first];
-    float distances[8];
-    *(float8 *)distances = entry;
+    const float *distances = (const float *)&entry;
     const uint second = BVH_FIRST_BIT(left);
     left &= left - 1;
     if (!left) {
@@ -235,8 +236,7 @@ INLINE uint bvh_push(__global const Node *node, uint lanes, const float8 entry, 
 
 // Takes the nearest of the hits in `lanes` of a pack, if it is nearer than the one before.
 INLINE bool bvh_keep(uint pack, uint lanes, const float8 distance, const float8 *weight, BvhHit *hit) {
-    float distances[8];
-    *(float8 *)distances = distance;
+    const float *distances = (const float *)&distance;
     uint nearest = BVH_FIRST_BIT(lanes);
     for (lanes &= lanes - 1; lanes; lanes &= lanes - 1) {
         const uint lane = BVH_FIRST_BIT(lanes);
@@ -305,9 +305,8 @@ INLINE BvhRay bvh_object_ray(__global const Object *object, const float *origin,
     return bvh_ray(object_origin, object_direction);
 }
 
-// `origins` and `directions` are three planes each, `stride` apart.
 // Nearest hit of the scene with 0 < t < hit->distance, else object is NO_INDEX; any one of them if `any`,
-// which fills nothing in.
+// which fills nothing in. `origins` and `directions` are three planes each, `stride` apart.
 BVH_CALL bool bvh_trace(__global const float *origins, __global const float *directions, uint stride,
                         __global const Node *top_nodes, __global const Node *nodes,
                         __global const TrianglePack *packs, __global const Object *objects, const bool any,
