@@ -232,6 +232,7 @@ def test_kernels_build_without_warnings(device: Device) -> None:
         for features in variants if "LIGHT_SAMPLING" in source(file) else [()]:
             if file == "illuminate" and not features:
                 continue  # launched only where there is something to sample
-            program = cl.Program(device.context, device.program_text(file, features)).build(options=["-Werror"])
+            program = cl.Program(device.context, device.program_text(file, features))
+            program.build(options=["-Werror"])
             log = program.get_build_info(device.cl_device, cl.program_build_info.LOG)
             assert "warning" not in log, (file, features, log)
