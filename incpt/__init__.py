@@ -1,12 +1,14 @@
 """incpt: an OpenCL path tracer that keeps its picture across an edit.
 
-    scene = incpt.load("scenes/editing.toml")
-    session = incpt.Session(scene, size=(960, 540))
-    session.render(spp=64)
-    session.edit(scene.with_object("red cube", rotation=(0, 30, 35)))
-    while session.mode is incpt.Mode.INCREMENTAL:
-        session.step()
-    image = session.image()  # (H, W, 3) float32 linear radiance
+```python
+scene = incpt.load("scenes/editing.toml")
+session = incpt.Session(scene, size=(960, 540))
+session.render(spp=64)
+session.edit(scene.with_object("red cube", rotation=(0, 30, 35)))
+while session.mode is incpt.Mode.INCREMENTAL:
+    session.step()
+image = session.image()  # (H, W, 3) float32 linear radiance
+```
 """
 
 from incpt.device import Device
