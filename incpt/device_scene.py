@@ -113,7 +113,6 @@ class DeviceScene:
             row["object_from_world"] = transform.invert_affine(matrix).ravel()
             row["first_node"], row["first_pack"], row["first_normal"] = self._places[obj.mesh]
             row["material"] = index[obj.material]
-            row["mirrored"] = np.linalg.det(matrix[:, :3]) < 0
             row["visible"] = obj.visible
         bounds = np.array([obj.world_bounds for obj in objects]).reshape(-1, 2, 3)
         self._upload("objects", rows)

@@ -207,7 +207,6 @@ OBJECT = _packed(
         ("first_pack", np.uint32),
         ("first_normal", np.uint32),  # float index of the mesh's corner normals, or NO_INDEX: flat faces
         ("material", np.uint32),
-        ("mirrored", np.uint32),  # 1 where world_from_object turns the winding round
         ("visible", np.uint32),
         ("unused_0", np.uint32),
         ("unused_1", np.uint32),

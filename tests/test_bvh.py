@@ -71,7 +71,6 @@ class World:
             record["world_from_object"] = matrix.ravel()
             record["object_from_world"] = transform.invert_affine(matrix).ravel()
             record["first_node"], record["first_pack"], record["first_normal"] = first[id(obj.mesh)]
-            record["mirrored"] = np.linalg.det(matrix[:, :3]) < 0
             record["visible"] = obj.visible
         material = np.zeros(1, layout.MATERIAL)
         material["flags"] = self.material_flags
