@@ -80,6 +80,21 @@ INLINE void shading_normal(__global const Object *object, __global const float *
             result[i] = -result[i];
 }
 
+// Moves a position on a triangle by that much towards its centroid. A ray that starts just above one face but
+// on the plane of its neighbour, which it must not miss, would slip out where the two meet.
+INLINE void leave_edge(__global const Object *object, const float (*vertex)[3], float offset,
+                       float *position) {
+    float middle[3], centroid[3];
+    for (uint i = 0; i < 3; i++)
+        middle[i] = (vertex[0][i] + vertex[1][i] + vertex[2][i]) * (1.0f / 3.0f);
+    bvh_transform_point(object->world_from_object, middle, centroid);
+    for (uint i = 0; i < 3; i++)
+        centroid[i] -= position[i];
+    const float share = offset / SQRT(dot3(centroid, centroid));
+    for (uint i = 0; i < 3; i++)
+        position[i] += (share < 1.0f ? share : 0.0f) * centroid[i];
+}
+
 // Writes all planes of a hit but its distance and object.
 BVH_CALL void write_hit(const BvhHit *hit, uint k, uint stride, __global const Object *object,
                         __global const TrianglePack *packs, __global const float *normals,
@@ -99,7 +114,9 @@ BVH_CALL void write_hit(const BvhHit *hit, uint k, uint stride, __global const O
     bvh_normal(vertex, normal);
     world_normal(object, normal, geometric);
     shading_normal(object, normals, face, weight, geometric, shading);
-    hits[HIT_OFFSET * stride + k] = offset_bound(object, vertex, geometric);
+    const float offset = offset_bound(object, vertex, geometric);
+    leave_edge(object, vertex, offset, position);
+    hits[HIT_OFFSET * stride + k] = offset;
     hits[HIT_MATERIAL * stride + k] = as_float(object->material);
     hits[HIT_TRIANGLE * stride + k] = as_float(face);
     for (uint i = 0; i < 3; i++) {
