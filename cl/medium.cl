@@ -59,3 +59,12 @@ INLINE int leave_medium(MediumStack *stack, uint material) {
 INLINE float medium_ior(__global const Material *materials, uint medium) {
     return medium == MEDIUM_NONE ? 1.0f : materials[medium].ior;
 }
+
+// What a medium lets through over a distance in metres, which may be infinite (Beer and Lambert).
+INLINE Vec3 transmittance(__global const Material *materials, uint medium, float distance) {
+    if (medium == MEDIUM_NONE)
+        return vec3(1.0f, 1.0f, 1.0f);
+    __global const float *a = materials[medium].absorption;
+    return vec3(a[0] > 0.0f ? exp(-a[0] * distance) : 1.0f, a[1] > 0.0f ? exp(-a[1] * distance) : 1.0f,
+                a[2] > 0.0f ? exp(-a[2] * distance) : 1.0f);
+}

@@ -29,18 +29,20 @@ __kernel void medium_shade(const Params params, const uint count, __global const
     uint seed = pixel_seed(bits[PATH_PIXEL * stride + path], params.seed);
     uint sample = bits[PATH_SAMPLE * stride + path];
 
-    // Absorption on the way here (Beer and Lambert).
+    // Absorption on the way here.
     MediumStack before = load_medium_stack(bits, stride, path);
-    if (before.entry[0] != MEDIUM_NONE) {
-        Vec3 absorption = material_vec3(materials[before.entry[0]].absorption);
-        throughput = times(throughput, vec3(exp(-absorption.x * distance), exp(-absorption.y * distance),
-                                            exp(-absorption.z * distance)));
-        store3(paths + PATH_THROUGHPUT_R * stride, stride, path, throughput);
-    }
+    throughput = times(throughput, transmittance(materials, before.entry[0], distance));
+    store3(paths + PATH_THROUGHPUT_R * stride, stride, path, throughput);
 
     // Opaque, or taken for opaque by chance where the material is partly transmissive.
     Uniform2 luck = uniform_2d(seed, sample, PAIR_LUCK(ray));
     if (luck.v >= material->transmission) {
+#ifdef LIGHT_SAMPLING
+        // `shade` knows no media: the light that its shadow ray will bring is absorbed beforehand.
+        Vec3 passed = transmittance(materials, before.entry[0], shadows[SHADOW_DISTANCE * stride + path]);
+        Vec3 light = load3(shadows + SHADOW_RADIANCE_R * stride, stride, path);
+        store3(shadows + SHADOW_RADIANCE_R * stride, stride, path, times(passed, light));
+#endif
         bits[PATH_CLASS * stride + path] = CLASS_SURFACE;
         return;
     }
@@ -90,6 +92,8 @@ __kernel void medium_shade(const Params params, const uint count, __global const
             Vec3 arriving = load3(shadows + SHADOW_RADIANCE_R * stride, stride, path);
             float weight = mis_weight(light_pdf, value.pdf) / light_pdf;
             arriving = times(times(throughput, value.f_cos), scaled(weight, arriving));
+            arriving = times(arriving, transmittance(materials, above > 0.0f ? near : far,
+                                                     shadows[SHADOW_DISTANCE * stride + path]));
             store3(shadows + SHADOW_ORIGIN_X * stride, stride, path,
                    along(position, above > 0.0f ? offset : -offset, geometric));
             store3(shadows + SHADOW_RADIANCE_R * stride, stride, path, arriving);

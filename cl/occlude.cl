@@ -2,32 +2,21 @@
 
 #include "bvh.cl"
 
-// Transmittance of an absorbing body (Beer-Lambert).
-static float transmittance(float absorption, float distance) {
-    return absorption > 0.0f ? exp(-absorption * distance) : 1.0f;
-}
-
 // The hint keeps compilers from making SIMD lanes of work-items (Intel's would): the lanes are boxes and
 // triangles.
 __kernel __attribute__((vec_type_hint(float8))) void
 occlude(const Params params, const uint count, __global const uint *list, __global const Node *top_nodes,
         __global const Node *nodes, __global const TrianglePack *packs, __global const Object *objects,
-        __global const Material *materials, __global const float *shadows, __global const float *paths,
-        __global float *radiance) {
+        __global const float *shadows, __global float *radiance) {
     if (get_global_id(0) >= count)
         return;
     const uint k = list[get_global_id(0)], stride = params.path_stride;
-    const float distance = shadows[SHADOW_DISTANCE * stride + k];
     BvhHit hit;
-    hit.distance = distance;
+    hit.distance = shadows[SHADOW_DISTANCE * stride + k];
     if (bvh_trace(shadows + SHADOW_ORIGIN_X * stride + k, shadows + SHADOW_DIRECTION_X * stride + k, stride,
                   top_nodes, nodes, packs, objects, true, &hit))
         return;
-    const uint medium = as_uint(paths[PATH_MEDIUM_0 * stride + k]) & MEDIUM_NONE;
-    for (uint c = 0; c < 3; c++) {
-        float value = shadows[(SHADOW_RADIANCE_R + c) * stride + k];
-        if (medium != MEDIUM_NONE)
-            value *= transmittance(materials[medium].absorption[c], distance);
-        radiance[c * params.buffer_stride + params.first_path + k] += value;
-    }
+    for (uint c = 0; c < 3; c++)
+        radiance[c * params.buffer_stride + params.first_path + k] +=
+            shadows[(SHADOW_RADIANCE_R + c) * stride + k];
 }

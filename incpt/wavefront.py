@@ -120,8 +120,8 @@ class Wavefront:
         )
         if shadow_count:
             self._launch(
-                "occlude", shadow_count, params, np.uint32(shadow_count), self._second, *scene.geometry,
-                self._shadows, self._paths, radiance,
+                "occlude", shadow_count, params, np.uint32(shadow_count), self._second, *scene.geometry[:4],
+                self._shadows, radiance,
             )  # fmt: skip
         self._live, self._next = self._next, self._live
         return next_count

@@ -45,7 +45,6 @@ class World:
     objects: Sequence[scene.Object]
     trees: dict[int, bvh.Bvh] = field(default_factory=dict)
     material_flags: int = 0
-    absorption: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         nodes, packs, normals, first = [], [], [np.empty(0, np.float32)], {}
@@ -74,7 +73,6 @@ class World:
             record["visible"] = obj.visible
         material = np.zeros(1, layout.MATERIAL)
         material["flags"] = self.material_flags
-        material["absorption"] = self.absorption
         upload = self.device.upload
         tables = [top.nodes, np.concatenate(nodes or [top.nodes]), np.concatenate(packs or [np.zeros(1)])]
         self.tables = [upload(table) for table in (*tables, records, material)]
@@ -85,7 +83,8 @@ class World:
         params["path_stride"] = params["buffer_stride"] = count
         kernel = self.device.kernel(name)
         path_list = self.device.upload(np.arange(count, dtype=np.uint32))
-        self.device.launch(kernel, count, params, np.uint32(count), path_list, *self.tables, *buffers)
+        tables = self.tables[: 4 if name == "occlude" else 5]
+        self.device.launch(kernel, count, params, np.uint32(count), path_list, *tables, *buffers)
 
     def intersect(self, origins: Floats, directions: Floats, medium: int = layout.NO_INDEX) -> Hits:
         count = len(origins)
@@ -100,9 +99,7 @@ class World:
         classes = self.device.read(path_buffer, paths)[PathPlane.CLASS].view(np.uint32)
         return Hits(self.device.read(hit_buffer, hits), classes)
 
-    def occlude(
-        self, origins: Floats, directions: Floats, distance: Floats | float, medium: int = layout.NO_INDEX
-    ) -> Floats:
+    def occlude(self, origins: Floats, directions: Floats, distance: Floats | float) -> Floats:
         """(N, 3) radiance that arrives where (1, 2, 3) is sent."""
         count = len(origins)
         shadows = np.zeros((len(ShadowPlane), count), np.float32)
@@ -110,11 +107,9 @@ class World:
         shadows[ShadowPlane.DIRECTION_X : ShadowPlane.DIRECTION_Z + 1] = directions.T
         shadows[ShadowPlane.DISTANCE] = distance
         shadows[ShadowPlane.RADIANCE_R : ShadowPlane.RADIANCE_B + 1] = np.array([[1], [2], [3]])
-        paths = np.zeros((len(PathPlane), count), np.float32)
-        paths[PathPlane.MEDIUM_0].view(np.uint32)[:] = medium
         radiance = np.zeros((3, count), np.float32)
         buffer = self.device.upload(radiance)
-        self._launch("occlude", count, self.device.upload(shadows), self.device.upload(paths), buffer)
+        self._launch("occlude", count, self.device.upload(shadows), buffer)
         return self.device.read(buffer, radiance).T
 
 
@@ -406,13 +401,6 @@ def test_shadow_rays_end_before_their_distance(device: Device) -> None:
     directions = np.tile(np.float32([0, -1, 0]), (4, 1))
     free = world.occlude(origins, directions, np.float32([1, 1.999, 2.001, np.inf]))
     np.testing.assert_array_equal(free[:, 0], [1, 1, 0, 0])
-
-
-def test_absorption_along_shadow_rays(device: Device) -> None:
-    world = World(device, [], absorption=(0.5, 0.0, 2.0))
-    origins, directions = random_rays(np.random.default_rng(1), 2)
-    inside = world.occlude(origins, directions, np.float32([3, np.inf]), medium=0xFFFF0000)
-    np.testing.assert_allclose(inside, [[np.exp(-1.5), 2, 3 * np.exp(-6)], [0, 2, 0]], rtol=1e-5)
 
 
 def test_classes_of_paths(device: Device) -> None:

@@ -246,3 +246,13 @@ def test_leaving_tells_whether_the_medium_was_there() -> None:
 def test_a_full_stack_forgets_the_lowest() -> None:
     entries, _ = _stack_after([1, 2, 3, 4, 5], np.array([[1, 2, 3, 4, 5], [5, 4, 3, 2, 1]], np.int32))
     np.testing.assert_array_equal(entries.T, [[4, 3, 2, 1], [4, 3, 2, 1]])
+
+
+def test_transmittance_of_a_medium() -> None:
+    materials = struct_rows(layout.MATERIAL, [{"absorption": (0.5, 0.0, 2.0)}])
+    medium = np.array([0, 0, 0, layout.MEDIUM_NONE], np.uint32)
+    distance = np.float32([0, 3, np.inf, 3])
+    body = "Vec3 t = transmittance(materials, m[i], d[i]); r[i] = t.x; g[i] = t.y; b[i] = t.z;"
+    passed = np.array(call("medium", body, 4, ("r", "g", "b"), materials=materials, m=medium, d=distance))
+    expected = [[1, 1, 1], [np.exp(-1.5), 1, np.exp(-6)], [0, 1, 0], [1, 1, 1]]
+    np.testing.assert_allclose(passed.T, expected, rtol=1e-5)
