@@ -17,7 +17,7 @@ import pyopencl as cl
 
 from incpt import albedo, bvh, layout, lights, transform
 from incpt.device import Device
-from incpt.scene import Change, Mesh, Scene, diff
+from incpt.scene import Change, Mesh, Scene, Vector, diff
 
 
 class DeviceScene:
@@ -64,6 +64,14 @@ class DeviceScene:
         """Triangle lights, and the environment's image and tables."""
         names = ("lights", "environment_image", "marginal", "conditional", "texel_pdf")
         return tuple(self._buffers[n] for n in names)
+
+    @property
+    def environment_radiance(self) -> Vector:
+        """The constant radiance of the environment, or the factor of its image."""
+        environment = self.scene.environment
+        # An image that is black all over has no table, and is not told from a missing one on the device.
+        black = environment.image is not None and self._environment is None
+        return (0.0, 0.0, 0.0) if black else environment.radiance
 
     def buffer(self, name: str) -> cl.Buffer:
         """One of the buffers: materials, layers, normals ..."""

@@ -323,7 +323,7 @@ class Session:
             params[name] = getattr(settings, name)
         params["light_count"] = self._device_scene.light_count
         params["environment_probability"] = self._device_scene.environment_probability
-        params["environment_color"] = scene.environment.radiance
+        params["environment_color"] = self._device_scene.environment_radiance
         if scene.environment.image is not None:
             shape = scene.environment.image.pixels.shape
             params["environment_height"], params["environment_width"] = shape[:2]
