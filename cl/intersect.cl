@@ -2,13 +2,6 @@
 
 #include "bvh.cl"
 
-// Rounding errors in units of float32's half ulp: of the position (seven operations of interpolation and
-// three of transform, pbrt-v4 section 6.8) and of the next ray's test against the same triangle (measured: 4
-// do).
-#define POSITION_ULPS 10.0f
-#define TEST_ULPS 8.0f
-#define HALF_ULP 5.9604645e-8f
-
 // Scaled before it is squared, because squares of very small or large components would leave the range of a
 // float.
 INLINE void make_unit(float *v) {
@@ -31,32 +24,10 @@ INLINE void world_normal(__global const Object *object, const float *normal, flo
     make_unit(result);
 }
 
-// How far along the unit normal a ray must start to be clear of the surface. Bounds, axis by axis as in
-// pbrt-v4 section 6.8, the rounding of the hit position (interpolation, transform to world space) and of the
-// next ray's origin (transform to object space); and, by the triangle's extent, the error of the test itself.
-INLINE float offset_bound(__global const Object *object, const float (*vertex)[3], const float *normal) {
-    __global const float *w = object->world_from_object, *m = object->object_from_world;
-    float largest[3], extent[3], world[3], back[3], bound = 0.0f, test = 0.0f;
-    for (uint i = 0; i < 3; i++) {
-        const float a = vertex[0][i], b = vertex[1][i], c = vertex[2][i];
-        const float low = a < b ? (a < c ? a : c) : (b < c ? b : c);
-        const float high = a > b ? (a > c ? a : c) : (b > c ? b : c);
-        largest[i] = -low > high ? -low : high;
-        extent[i] = high - low;
-    }
-    for (uint i = 0; i < 3; i++)
-        world[i] = FABS(w[4 * i]) * largest[0] + FABS(w[4 * i + 1]) * largest[1] +
-                   FABS(w[4 * i + 2]) * largest[2] + FABS(w[4 * i + 3]);
-    for (uint i = 0; i < 3; i++)
-        back[i] = FABS(m[4 * i]) * world[0] + FABS(m[4 * i + 1]) * world[1] + FABS(m[4 * i + 2]) * world[2] +
-                  FABS(m[4 * i + 3]);
-    for (uint i = 0; i < 3; i++) {
-        const float x = FABS(w[4 * i]), y = FABS(w[4 * i + 1]), z = FABS(w[4 * i + 2]);
-        bound += FABS(normal[i]) * (world[i] + x * back[0] + y * back[1] + z * back[2]);
-        const float size = x * extent[0] + y * extent[1] + z * extent[2];
-        test = size > test ? size : test;
-    }
-    return HALF_ULP * (POSITION_ULPS * bound + TEST_ULPS * test);
+// How far along the unit normal a ray must start to be clear of the surface.
+INLINE float offset_bound(__global const Object *object, const float *normal) {
+    __global const float *error = object->position_error;
+    return FABS(normal[0]) * error[0] + FABS(normal[1]) * error[1] + FABS(normal[2]) * error[2];
 }
 
 INLINE void shading_normal(__global const Object *object, __global const float *normals, uint face,
@@ -114,7 +85,7 @@ BVH_CALL void write_hit(const BvhHit *hit, uint k, uint stride, __global const O
     bvh_normal(vertex, normal);
     world_normal(object, normal, geometric);
     shading_normal(object, normals, face, weight, geometric, shading);
-    const float offset = offset_bound(object, vertex, geometric);
+    const float offset = offset_bound(object, geometric);
     leave_edge(object, vertex, offset, position);
     hits[HIT_OFFSET * stride + k] = offset;
     hits[HIT_MATERIAL * stride + k] = as_float(object->material);

@@ -118,7 +118,9 @@ class DeviceScene:
         for row, obj in zip(rows, objects, strict=True):
             matrix = obj.world_from_object
             row["world_from_object"] = matrix.ravel()
-            row["object_from_world"] = transform.invert_affine(matrix).ravel()
+            inverse = transform.invert_affine(matrix)
+            row["object_from_world"] = inverse.ravel()
+            row["position_error"] = bvh.position_error(obj.mesh.bounds, matrix, inverse)
             row["first_node"], row["first_pack"], row["first_normal"] = self._places[obj.mesh]
             row["material"] = index[obj.material]
             row["visible"] = obj.visible

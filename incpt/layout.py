@@ -203,13 +203,12 @@ OBJECT = _packed(
     [
         ("object_from_world", np.float32, (12,)),  # 3 x 4, row by row
         ("world_from_object", np.float32, (12,)),
+        ("position_error", np.float32, (3,)),  # bound of a hit position's rounding error by axis, world space
         ("first_node", np.uint32),  # of its mesh in the buffer of all nodes
         ("first_pack", np.uint32),
         ("first_normal", np.uint32),  # float index of the mesh's corner normals, or NO_INDEX: flat faces
         ("material", np.uint32),
         ("visible", np.uint32),
-        ("unused_0", np.uint32),
-        ("unused_1", np.uint32),
     ]
 )
 

@@ -68,7 +68,9 @@ class World:
         for record, obj in zip(records, self.objects, strict=False):
             matrix = obj.world_from_object
             record["world_from_object"] = matrix.ravel()
-            record["object_from_world"] = transform.invert_affine(matrix).ravel()
+            inverse = transform.invert_affine(matrix)
+            record["object_from_world"] = inverse.ravel()
+            record["position_error"] = bvh.position_error(obj.mesh.bounds, matrix, inverse)
             record["first_node"], record["first_pack"], record["first_normal"] = first[id(obj.mesh)]
             record["visible"] = obj.visible
         material = np.zeros(1, layout.MATERIAL)
