@@ -20,7 +20,7 @@ def render(
     scene: Scene, spp: int, size: tuple[int, int] = (32, 32), on: Device | None = None, **settings: Any
 ) -> npt.NDArray[np.float64]:
     """(H, W, 3) with exactly `spp` samples (a power of two) a pixel, none of them undefined."""
-    rate = min(spp, max(1, 65536 // (size[0] * size[1])))
+    rate = min(spp, 1 << max(0, (65536 // (size[0] * size[1])).bit_length() - 1))
     session = Session(scene, size, RenderSettings(sample_rate=rate, **settings), on or device())
 
     def check(report: StepReport) -> None:
