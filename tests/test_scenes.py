@@ -116,7 +116,8 @@ def test_edits_are_those_of_the_thesis(scenes: dict[str, Scene]) -> None:
     assert [diff(scene, new).is_global for new in after] == [False] * 3
     small, red, large = (new.object(name) for new, name in zip(after, names, strict=True))
     assert small.scale[0] < scene.object(names[0]).scale[0]
-    assert small.world_bounds[0, 1] == pytest.approx(0.0, abs=FLOOR_TOLERANCE)
+    for obj in (small, red, large):
+        assert obj.world_bounds[0, 1] == pytest.approx(0.0, abs=FLOOR_TOLERANCE)
     turned = np.subtract(red.rotation, scene.object(names[1]).rotation)
     assert turned[2] != 0 and not turned[:2].any()
     moved = np.subtract(large.position, scene.object(names[2]).position)
