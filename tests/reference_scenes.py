@@ -85,23 +85,24 @@ def glass() -> Scene:
 
 def plates() -> Scene:
     """Metal plates of rising roughness that reflect lamps of four sizes (after Veach 1997)."""
-    roughness, tilt = (0.15, 0.25, 0.35, 0.45), (22, 14, 7, 0)
+    roughness = (0.15, 0.22, 0.3, 0.4)
+    height, depth, tilt = (0.75, 0.4, 0.15, 0.0), (-1.1, -0.3, 0.5, 1.3), (21, 13, 7, 1)
     sizes, colours = (0.06, 0.15, 0.35, 0.7), ((1, 0.6, 0.5), (1, 1, 0.6), (0.5, 1, 0.6), (0.5, 0.7, 1))
     materials = {"floor": _matt(0.4, 0.4, 0.4)}
     objects = [_plane("floor", "floor", (0, -0.4, 0), (0, 0, 0), (8, 1, 8))]
     for i in range(4):
-        power = 0.6 / sizes[i] ** 2
+        power = 0.3 / sizes[i] ** 2
         materials |= {
             f"plate {i}": _metal(roughness[i]),
             f"lamp {i}": _lamp(*(power * c for c in colours[i])),
         }
-        plate, lamp = (0, 0.12 * (3 - i) ** 1.4, 0.75 * i - 1.4), (0.9 * i - 1.35, 2.2, -1.5)
+        plate, lamp = (0, height[i], depth[i]), (0.9 * i - 1.35, 2.2, -2.2)
         objects += [
-            _cube(f"plate {i}", f"plate {i}", plate, (tilt[i], 0, 0), (3, 0.05, 0.6)),
+            _cube(f"plate {i}", f"plate {i}", plate, (tilt[i], 0, 0), (3, 0.05, 0.7)),
             _plane(f"lamp {i}", f"lamp {i}", lamp, (130, 0, 0), (sizes[i], 1, sizes[i])),
         ]
-    camera = Camera((0, 1.9, 4.6), (0, 0.35, -0.2), fov_y=40)
-    return Scene(camera, Environment(color=(0.02, 0.02, 0.02)), materials, tuple(objects))
+    camera = Camera((0, 1.9, 4.6), (0, 0.8, -0.2), fov_y=42)
+    return Scene(camera, Environment(color=(0.05, 0.05, 0.06)), materials, tuple(objects))
 
 
 def environment() -> Scene:
