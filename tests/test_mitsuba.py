@@ -33,7 +33,7 @@ def test_same_picture_as_mitsuba(name: str) -> None:
     lit = expected > 0
     assert (np.abs(z[lit]) < 1).mean() > 0.6
     assert (np.abs(z[lit]) < 4.5).mean() > 0.99
-    assert (image[~lit] == 0).mean() > 0.99
+    assert np.count_nonzero(image[~lit]) <= 0.01 * np.count_nonzero(~lit)
 
     # No region is off: blocks of 8 x 8 pixels, 1 % of their value allowed beside the noise.
     error = np.sqrt(blocks(expected_error**2, 8) / 64)

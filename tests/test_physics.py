@@ -369,7 +369,7 @@ def test_each_technique_alone_gives_the_same(
     }[case]
     arguments = {"max_bounces": 3, "transmission_bounces": 4, "size": (32, 32)}
     both = repeat(scene, 64, **arguments)
-    alone = repeat(scene, 256, on=_only(technique, monkeypatch), **arguments)
+    alone = repeat(scene, 128, on=_only(technique, monkeypatch), **arguments)
     assert_same_mean(both, alone, relative=0.02)
     assert blocks(both, 8).var(axis=0).mean() > 0
 
