@@ -644,3 +644,35 @@ def test_no_light_leaks_between_the_walls_of_a_room() -> None:
     for target in ((1, 0.4, 0.3), (-1, 2, -0.5)):
         image = render(scene.with_camera(target=target), 256, max_bounces=4, roulette_depth=255)
         assert (image == 0).all()
+
+
+# Odd numbers
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_sample_is_undefined_or_negative(seed: int) -> None:
+    # Extremes of every parameter at once; `render` asserts that all samples are finite.
+    rng = np.random.default_rng(seed)
+
+    def pick(*values: float) -> float:
+        return float(rng.choice(values))
+
+    materials, objects = {}, []
+    for i in range(8):
+        materials[f"m{i}"] = Material(
+            (pick(0, 0.5, 1), pick(0, 1), pick(0, 1)), metallic=pick(0, 0, 0.5, 1),
+            roughness=pick(0, 0.01, 0.04, 0.3, 1), specular=pick(0, 0.5, 1), ior=pick(1, 1.0001, 1.5, 100),
+            transmission=pick(0, 0, 0.5, 1, 1), absorption=(pick(0, 1, 1e9), 0, pick(0, 1)),
+            priority=int(pick(0, 1, 2)), emission=(pick(0, 0, 1, 1e9), 0, 0), double_sided=bool(pick(0, 1)),
+        )  # fmt: skip
+        scale = tuple(pick(-1, 1) * pick(1e-6, 1e-3, 0.5, 1, 3, 1e6) for _ in range(3))
+        position = tuple(rng.normal(size=3))
+        name = str(rng.choice(["cube", "sphere", "plane", "cylinder"]))
+        objects.append(Object(f"o{i}", shape(name), f"m{i}", position, tuple(360 * rng.random(3)), scale))
+    pixels = rng.random((4, 8, 3)).astype(np.float32) ** 8 * np.float32(pick(1, 1e9))
+    sky = [Environment(), CONSTANT, Environment((1, 1, 1), Image(pixels), 30), Environment((1e9, 0, 0))][
+        seed % 4
+    ]
+    scene = Scene(Camera((0, 0.5, 2), (0, 0, 0)), sky, materials, tuple(objects))
+    image = render(scene, 64, (16, 16), max_bounces=8, roulette_depth=int(pick(0, 4)))
+    assert image.min() >= 0
