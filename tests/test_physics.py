@@ -545,6 +545,19 @@ def test_a_body_inside_one_of_higher_priority_is_not_there() -> None:
     np.testing.assert_allclose(_layers(seen, 0.0, True), expected, atol=3e-3)
 
 
+def test_a_hidden_boundary_neither_tints_nor_scatters_nor_counts() -> None:
+    outer = _glass(1.5, priority=2)
+    hidden = Material((0.2, 0.5, 0.8), roughness=0.6, transmission=1, ior=2.0, priority=1)
+    slabs = [Object("outer", shape("cube"), "outer", scale=(100, 100, 2))]
+    slabs += [Object(f"hidden {i}", shape("cube"), "hidden", (0, 0, 0.2 * i - 0.3), scale=(90, 90, 0.1))
+              for i in range(4)]  # fmt: skip
+    wall = _plane("wall", "lamp", position=(0, 0, -6), rotation=(90, 0, 0), scale=(900, 1, 900))
+    materials = {"outer": outer, "hidden": hidden, "lamp": lamp(1, 1, 1, double_sided=True)}
+    scene = Scene(Camera((0, 0, 3), (0, 0, 0), fov_y=0.2), Environment(), materials, (wall, *slabs))
+    image = render(scene, 2048, (8, 8), max_bounces=0, transmission_bounces=2, roulette_depth=255)
+    np.testing.assert_allclose(image.mean(axis=(0, 1)), (1 - 0.04) ** 2, atol=3e-3)
+
+
 def test_liquid_in_a_glass_needs_no_gap() -> None:
     # Overlapping by a little, and by half, is the same picture but for the thickness of the wall.
     wall, liquid = _glass(1.5, priority=2), _glass(1.333, (1, 2, 3), priority=1)
