@@ -298,3 +298,9 @@ def test_environment_samples_estimate_its_light() -> None:
 
 def test_black_image_has_no_table() -> None:
     assert lights.environment_table(Image(np.zeros((4, 8, 3), np.float32))) is None
+
+
+def test_lights_weigh_by_luminance_and_sides() -> None:
+    one = lights.radiant_weight(Material(emission=(1, 2, 3)))
+    assert one == pytest.approx(0.2126 + 2 * 0.7152 + 3 * 0.0722)
+    assert lights.radiant_weight(Material(emission=(1, 2, 3), double_sided=True)) == pytest.approx(2 * one)

@@ -356,7 +356,7 @@ def _sky() -> Environment:
     return Environment((1, 1, 1), Image(pixels), rotation_y=40)
 
 
-@pytest.mark.parametrize("case", ["triangles", "environment", "both", "rough glass"])
+@pytest.mark.parametrize("case", ["triangles", "environment", "both", "rough glass", "rough glass, direct"])
 @pytest.mark.parametrize("technique", ["light", "bsdf"])
 def test_each_technique_alone_gives_the_same(
     case: str, technique: str, monkeypatch: pytest.MonkeyPatch
@@ -366,8 +366,8 @@ def test_each_technique_alone_gives_the_same(
         "environment": _plates(_sky()).without_object("small").without_object("large"),
         "both": _plates(_sky()),
         "rough glass": _plates(Environment(), _FROSTED),
-    }[case]
-    arguments = {"max_bounces": 3, "transmission_bounces": 4, "size": (32, 32)}
+    }[case.removesuffix(", direct")]
+    arguments = {"max_bounces": 0 if "direct" in case else 3, "transmission_bounces": 4, "size": (32, 32)}
     both = repeat(scene, 64, **arguments)
     alone = repeat(scene, 128, on=_only(technique, monkeypatch), **arguments)
     assert_same_mean(both, alone, relative=0.02)
