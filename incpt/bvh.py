@@ -30,8 +30,8 @@ CHUNK = 1 << 12
 _FILE = "build_bvh"
 
 # Rounding errors of a hit in units of float32's half ulp: of its position (seven operations of interpolation
-# and three of transform, pbrt-v4 section 6.8), and of the next ray's test against the same triangle (measured:
-# 4 do, 2 do not).
+# and three of transform, pbrt-v4 section 6.8), and of the next ray's test against the same triangle, which
+# was measured (4 do, 2 do not).
 _POSITION_ULPS = 10
 _TEST_ULPS = 8
 _HALF_ULP = 2.0**-24
