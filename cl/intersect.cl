@@ -113,13 +113,13 @@ intersect(const Params params, const uint count, __global const uint *list, __gl
               packs, objects, false, &hit);
     hits[HIT_DISTANCE * stride + k] = hit.distance;
     hits[HIT_OBJECT * stride + k] = as_float(hit.object);
-    uint kind = CLASS_SURFACE;
+    uint path_class = CLASS_ESCAPED;
     if (hit.object != NO_INDEX) {
         __global const Object *object = objects + hit.object;
         write_hit(&hit, k, stride, object, packs, normals, hits);
         const bool in_medium = as_uint(paths[PATH_MEDIUM_0 * stride + k]) != NO_INDEX;
         const bool transmissive = materials[object->material].flags & MATERIAL_TRANSMISSIVE;
-        kind = in_medium || transmissive ? CLASS_MEDIUM : CLASS_SURFACE;
+        path_class = in_medium || transmissive ? CLASS_MEDIUM : CLASS_SURFACE;
     }
-    paths[PATH_CLASS * stride + k] = as_float(CLASS_LIVE | kind);
+    paths[PATH_CLASS * stride + k] = as_float(path_class);
 }

@@ -1,36 +1,27 @@
 #include "light.cl"
 
-// What happens where a ray ends on an opaque surface or leaves the scene: the path gathers what is emitted
-// there, asks for a shadow ray towards a light, and goes on in a direction that the material chooses.
+// What happens where a ray ends on an opaque surface: the path gathers what is emitted there, asks for a
+// shadow ray towards a light, and goes on in a direction that the material chooses.
 //
 //   L_o(wo) = L_e(wo) + integral of f(wo, wi) L_i(wi) cos(wi) d wi
 //
 // with the integral estimated by light sampling (`illuminate` has chosen a light) and by BSDF sampling (the
 // next ray, whose emission counts at its end), combined by multiple importance sampling. Straight-line code
-// of scalars, so that PoCL runs it in SIMD lanes.
+// of scalars, so that PoCL runs it in SIMD lanes. The variant EMISSION_ONLY serves rays after which no path
+// goes on.
 __kernel void shade(const Params params, const uint count, __global const uint *list,
                     __global const Material *materials, __global const float *layers,
-                    __global const float *lights, __global const float *environment_image,
-                    __global const float *environment_marginal, __global const float *environment_conditional,
-                    __global const float *environment_pdf, __global const float *hits, __global float *rays,
-                    __global float *paths, __global float *shadows, __global float *radiance) {
+                    __global const float *hits, __global float *rays, __global float *paths,
+                    __global float *shadows, __global float *radiance) {
     uint stride = params.path_stride;
     uint item = (uint)get_global_id(0);
     int listed = item < count;
     uint path = listed ? list[item] : stride - 1u;
     uint result = listed ? params.first_path + path : params.buffer_stride - 1u;
     __global uint *bits = (__global uint *)paths;
-    Emitters emitters;
-    emitters.lights = lights;
-    emitters.image = environment_image;
-    emitters.marginal = environment_marginal;
-    emitters.conditional = environment_conditional;
-    emitters.texel_pdf = environment_pdf;
 
     // Where the ray ended.
-    __global const uint *hit_bits = (__global const uint *)hits;
-    int missed = hit_bits[HIT_OBJECT * stride + path] == NO_INDEX;
-    uint material_index = missed ? 0u : hit_bits[HIT_MATERIAL * stride + path];
+    uint material_index = ((__global const uint *)hits)[HIT_MATERIAL * stride + path];
     __global const Material *material = &materials[material_index];
     Vec3 direction = load3(rays + RAY_DIRECTION_X * stride, stride, path);
     Vec3 position = load3(hits + HIT_POSITION_X * stride, stride, path);
@@ -44,16 +35,14 @@ __kernel void shade(const Params params, const uint count, __global const uint *
     uint bounces = counts & 0xffu;
     uint ray = (counts >> 16) & 0xffu;
 
-    // Emission at the hit, or radiance from far away.
     float facing = -inner(geometric, direction);
     Vec3 emitted = emitted_radiance(material, facing, distance, bsdf_pdf);
-    float environment_light_pdf;
-    Vec3 far = eval_environment(&params, &emitters, direction, &environment_light_pdf);
-    float far_weight = bsdf_pdf > 0.0f ? mis_weight(MAX(bsdf_pdf, 1e-30f), environment_light_pdf) : 1.0f;
-    emitted = choose(missed, scaled(far_weight, far), emitted);
     Vec3 gathered = load3(radiance, params.buffer_stride, result);
     store3(radiance, params.buffer_stride, result, add(gathered, times(throughput, emitted)));
 
+#ifdef EMISSION_ONLY
+    bits[PATH_CLASS * stride + path] = 0u;
+#else
     // The surface as seen along the ray: both normals on its side.
     float side = facing > 0.0f ? 1.0f : -1.0f;
     geometric = scaled(side, geometric);
@@ -64,7 +53,7 @@ __kernel void shade(const Params params, const uint count, __global const uint *
     wo.z = MAX(wo.z, 1e-4f);
     Surface surface = surface_of(material, layers + material_index * (ALBEDO_TABLE_SIZE + 1u));
     Vec3 origin = along(position, offset, geometric);
-    int scatters = !missed & (bounces <= params.max_bounces);
+    int scatters = bounces <= params.max_bounces;
 
     uint seed = pixel_seed(bits[PATH_PIXEL * stride + path], params.seed);
     uint sample = bits[PATH_SAMPLE * stride + path];
@@ -105,4 +94,5 @@ __kernel void shade(const Params params, const uint count, __global const uint *
     paths[PATH_BSDF_PDF * stride + path] = next.pdf;
     bits[PATH_COUNTS * stride + path] = counts + 0x10001u;
     bits[PATH_CLASS * stride + path] = path_class | (goes_on ? CLASS_LIVE : 0u);
+#endif
 }

@@ -157,6 +157,7 @@ class PathClass(IntFlag):
     SHADOW = 2
     SURFACE = 4
     MEDIUM = 8
+    ESCAPED = 16
 
 
 class SlotFlag(IntFlag):

@@ -4,7 +4,7 @@ Instead of one kernel with the path loop, each stage of all paths runs as a kern
 of the paths that need it: a terminated path costs nothing more, and on PoCL the straight-line stages run
 in SIMD lanes. Paths are traced in chunks whose state fits the caches of a CPU.
 
-    generate -> [ intersect -> illuminate -> (medium_shade) -> shade -> occlude ] once a ray -> radiance
+    generate -> [ intersect -> escape, medium_shade, illuminate, shade -> occlude ] once a ray -> radiance
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from incpt.device import Device
 from incpt.device_scene import DeviceScene
 
 _COMPACT_BLOCK = 64  # COMPACT_BLOCK in cl/compact.cl
+_MOST_LISTS = 3
 _MOST_RAYS = 256
 """Bound on the rays of a path; kernels end paths before it."""
 
@@ -40,8 +41,10 @@ class Wavefront:
         )
         for buffer in (self._rays, self._paths, self._hits, self._shadows):
             device.fill(buffer, 0, buffer.size)
-        self._live, self._next, self._first, self._second = (device.empty(4 * self.stride) for _ in range(4))
-        self._counters = device.empty(8)
+        self._live, self._next, self._surfaces, self._media, self._escaped, self._shadowed = (
+            device.empty(4 * self.stride) for _ in range(6)
+        )
+        self._counters = device.empty(4 * _MOST_LISTS)
 
     def trace(
         self,
@@ -58,11 +61,11 @@ class Wavefront:
             self._launch(
                 "generate", self.chunk_paths_of(chunk), chunk, slots, self._rays, self._paths, radiance
             )
-            count, _ = self._compact(chunk, self.chunk_paths_of(chunk), None, _Class.LIVE, self._live)
-            for _ in range(_MOST_RAYS):
+            count = self._compact(chunk, self.chunk_paths_of(chunk), None, (_Class.LIVE, self._live))[0]
+            for ray in range(_MOST_RAYS):
                 if count == 0:
                     break
-                count = self._bounce(scene, chunk, count, radiance)
+                count = self._bounce(scene, chunk, ray, count, radiance)
 
     def first_hits(
         self,
@@ -80,7 +83,7 @@ class Wavefront:
             chunk = self._chunk_params(params, first, path_count)
             size = self.chunk_paths_of(chunk)
             self._launch("generate", size, chunk, slots, self._rays, self._paths, radiance)
-            count, _ = self._compact(chunk, size, None, _Class.LIVE, self._live)
+            count = self._compact(chunk, size, None, (_Class.LIVE, self._live))[0]
             self._intersect(scene, chunk, count)
             self._launch(
                 "aov", size, chunk, pixels, scene.buffer("materials"), self._hits, self._paths, surface,
@@ -101,26 +104,43 @@ class Wavefront:
         return chunk
 
     def _bounce(
-        self, scene: DeviceScene, params: npt.NDArray[np.void], count: int, radiance: cl.Buffer
+        self, scene: DeviceScene, params: npt.NDArray[np.void], ray: int, count: int, radiance: cl.Buffer
     ) -> int:
-        """One ray of every live path; returns how many paths go on."""
+        """Ray number `ray` of every live path; returns how many paths go on."""
         self._intersect(scene, params, count)
-        self._illuminate(scene, params, count)
-        state = (self._hits, self._rays, self._paths, self._shadows, radiance)
-        surfaces, surface_count = self._live, count
-        if scene.has_media:
-            surfaces, surface_count = self._shade_media(scene, params, count, state)
+        surface_count, escaped_count, medium_count = self._compact(
+            params,
+            count,
+            self._live,
+            (_Class.SURFACE, self._surfaces),
+            (_Class.ESCAPED, self._escaped),
+            (_Class.MEDIUM, self._media),
+        )
+        if escaped_count and any(scene.environment_radiance):
+            self._launch(
+                "escape", escaped_count, params, np.uint32(escaped_count), self._escaped,
+                scene.buffer("environment_image"), scene.buffer("texel_pdf"), self._rays, self._paths,
+                radiance, features=scene.features,
+            )  # fmt: skip
+        # Without media every ray is a scattering event, so that all paths end with the same one.
+        last = not scene.has_media and ray > int(params["max_bounces"])
+        if surface_count and not last:
+            self._illuminate(scene, params, surface_count, self._surfaces)
+        if medium_count:
+            self._illuminate(scene, params, medium_count, self._media)
+            surface_count = self._shade_media(scene, params, medium_count, radiance)
         if surface_count:
             self._launch(
-                "shade", surface_count, params, np.uint32(surface_count), surfaces, scene.buffer("materials"),
-                scene.buffer("layers"), *scene.emitters, *state, features=scene.features,
+                "shade", surface_count, params, np.uint32(surface_count), self._surfaces,
+                scene.buffer("materials"), scene.buffer("layers"), *self._state, radiance,
+                features=("EMISSION_ONLY",) if last else scene.features,
             )  # fmt: skip
-        next_count, shadow_count = self._compact(
-            params, count, self._live, _Class.LIVE, self._next, _Class.SHADOW, self._second
+        next_count, shadow_count, _ = self._compact(
+            params, count, self._live, (_Class.LIVE, self._next), (_Class.SHADOW, self._shadowed)
         )
         if shadow_count:
             self._launch(
-                "occlude", shadow_count, params, np.uint32(shadow_count), self._second, *scene.geometry[:4],
+                "occlude", shadow_count, params, np.uint32(shadow_count), self._shadowed, *scene.geometry[:4],
                 self._shadows, radiance,
             )  # fmt: skip
         self._live, self._next = self._next, self._live
@@ -132,56 +152,51 @@ class Wavefront:
             scene.buffer("normals"), self._rays, self._paths, self._hits,
         )  # fmt: skip
 
-    def _illuminate(self, scene: DeviceScene, params: npt.NDArray[np.void], count: int) -> None:
+    def _illuminate(
+        self, scene: DeviceScene, params: npt.NDArray[np.void], count: int, paths: cl.Buffer
+    ) -> None:
         if scene.features:
             self._launch(
-                "illuminate", count, params, np.uint32(count), self._live, *scene.emitters, self._hits,
+                "illuminate", count, params, np.uint32(count), paths, *scene.emitters, self._hits,
                 self._paths, self._shadows, features=scene.features,
             )  # fmt: skip
 
     def _shade_media(
-        self,
-        scene: DeviceScene,
-        params: npt.NDArray[np.void],
-        count: int,
-        state: tuple[cl.Buffer, ...],
-    ) -> tuple[cl.Buffer, int]:
-        """Shade the paths at or in transparent bodies; returns the list of those on opaque surfaces."""
-        surface_count, medium_count = self._compact(
-            params, count, self._live, _Class.SURFACE, self._first, _Class.MEDIUM, self._second
-        )
-        if medium_count:
-            self._launch(
-                "medium_shade", medium_count, params, np.uint32(medium_count), self._second,
-                scene.buffer("materials"), *state, features=scene.features,
-            )  # fmt: skip
-            # Those that stand on an opaque surface inside a medium join the others.
-            surface_count, _ = self._compact(
-                params, medium_count, self._second, _Class.SURFACE, self._first, append=True
-            )
-        return self._first, surface_count
+        self, scene: DeviceScene, params: npt.NDArray[np.void], count: int, radiance: cl.Buffer
+    ) -> int:
+        """Shade the paths at or in transparent bodies. Those that stand on an opaque surface in there join
+        the others; returns how many they are then."""
+        self._launch(
+            "medium_shade", count, params, np.uint32(count), self._media, scene.buffer("materials"),
+            *self._state, radiance, features=scene.features,
+        )  # fmt: skip
+        return self._compact(params, count, self._media, (_Class.SURFACE, self._surfaces), append=True)[0]
+
+    @property
+    def _state(self) -> tuple[cl.Buffer, ...]:
+        return self._hits, self._rays, self._paths, self._shadows
 
     def _compact(
         self,
         params: npt.NDArray[np.void],
         count: int,
         source: cl.Buffer | None,
-        first_bits: _Class,
-        first: cl.Buffer,
-        second_bits: _Class | None = None,
-        second: cl.Buffer | None = None,
+        *lists: tuple[_Class, cl.Buffer],
         append: bool = False,
-    ) -> tuple[int, int]:
-        """Sort paths of `source` (None: all) into lists by class; returns the lengths of both lists."""
+    ) -> tuple[int, int, int]:
+        """Sort paths of `source` (None: all) into up to three lists by class; returns the lists' lengths.
+        `append` goes on with the lists of the last call."""
         if not append:
-            self.device.fill(self._counters, 0, 8)
+            self.device.fill(self._counters, 0, 4 * _MOST_LISTS)
+        unused = (_Class(0), self._escaped)
+        targets = (*lists, unused, unused)[:_MOST_LISTS]
         self._launch(
             "compact", -(-count // _COMPACT_BLOCK), params, np.uint32(count), np.uint32(source is None),
-            source or self._live, self._paths, np.uint32(first_bits), first, np.uint32(second_bits or 0),
-            second or self._second, self._counters,
+            source or self._live, self._paths,
+            *(arg for bits, target in targets for arg in (np.uint32(bits), target)), self._counters,
         )  # fmt: skip
-        lengths = self.device.read(self._counters, np.empty(2, np.uint32))
-        return int(lengths[0]), int(lengths[1])
+        first, second, third = self.device.read(self._counters, np.empty(_MOST_LISTS, np.uint32)).tolist()
+        return first, second, third
 
     def _launch(self, name: str, size: int, *args: Any, features: tuple[str, ...] = ()) -> None:
         self.device.launch(self.device.kernel(name, features=features), size, *args)

@@ -408,13 +408,13 @@ def test_shadow_rays_end_before_their_distance(device: Device) -> None:
 def test_classes_of_paths(device: Device) -> None:
     origins = np.tile(np.float32([0.1, 2, 0.2]), (2, 1))
     directions = np.float32([[0, -1, 0], [0, 1, 0]])
-    surface, medium = PathClass.LIVE | PathClass.SURFACE, PathClass.LIVE | PathClass.MEDIUM
+    surface, medium, escaped = PathClass.SURFACE, PathClass.MEDIUM, PathClass.ESCAPED
     objects = [as_object(scene.shape("plane"))]
     glass = World(device, objects, material_flags=layout.MaterialFlag.TRANSMISSIVE)
     diffuse = World(device, objects)
-    assert glass.intersect(origins, directions).classes.tolist() == [medium, surface]
-    assert diffuse.intersect(origins, directions).classes.tolist() == [surface, surface]
-    assert diffuse.intersect(origins, directions, medium=0xFFFF0000).classes.tolist() == [medium, surface]
+    assert glass.intersect(origins, directions).classes.tolist() == [medium, escaped]
+    assert diffuse.intersect(origins, directions).classes.tolist() == [surface, escaped]
+    assert diffuse.intersect(origins, directions, medium=0xFFFF0000).classes.tolist() == [medium, escaped]
 
 
 # --- what goes wrong in careless traversals -----------------------------------------------------------------

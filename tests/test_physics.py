@@ -322,10 +322,11 @@ def _only(technique: str, monkeypatch: pytest.MonkeyPatch) -> Device:
         ("ENVIRONMENT_IMAGE",),
         ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS"),
     ):
-        for kernel in ("shade", "medium_shade"):
+        for kernel in ("shade", "medium_shade", "escape"):
             device.kernel(kernel, features=features)
-    # shade weights a light, an emitter that is hit, and the environment; medium_shade the first two.
-    assert places == {"light": 4 * 2, "bsdf": 4 * 3}
+    # shade and medium_shade weight a light and an emitter that is hit, escape the environment (and has the
+    # emitter's function in its source).
+    assert places == {"light": 4 * 2, "bsdf": 4 * 4}
     return device
 
 
