@@ -165,10 +165,8 @@ class DeviceScene:
                          "transmission", "priority"):  # fmt: skip
                 row[name] = getattr(material, name)
             row["light_pdf"] = lights.radiant_weight(material) * self._light_scale
-            row["flags"] = (
-                (flags.DOUBLE_SIDED if material.double_sided else 0)
-                | (flags.TRANSMISSIVE if material.transmission > 0 else 0)
-                | (flags.EMISSIVE if material.is_emissive else 0)
+            row["flags"] = (flags.DOUBLE_SIDED if material.double_sided else 0) | (
+                flags.TRANSMISSIVE if material.transmission > 0 else 0
             )
             layer[:] = albedo.layer_row(material)
         self.has_media = any(material.transmission > 0 for material in materials)

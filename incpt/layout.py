@@ -173,7 +173,6 @@ class MaterialFlag(IntFlag):
 
     DOUBLE_SIDED = 1
     TRANSMISSIVE = 2
-    EMISSIVE = 4
 
 
 def _packed(fields: list[Any]) -> np.dtype[np.void]:
@@ -226,9 +225,6 @@ MATERIAL = _packed(
         ("light_pdf", np.float32),  # area density with which light sampling finds a point of this emitter
         ("priority", np.uint32),
         ("flags", np.uint32),
-        ("unused_0", np.uint32),
-        ("unused_1", np.uint32),
-        ("unused_2", np.uint32),
     ]
 )
 
@@ -260,7 +256,6 @@ PARAMS = _packed(
         ("width", np.uint32),
         ("height", np.uint32),
         ("tile_size", np.uint32),
-        ("slot_count", np.uint32),
         ("first_path", np.uint32),  # of this chunk in the path buffer
         ("path_count", np.uint32),  # in this chunk
         ("path_stride", np.uint32),  # of the planes of path state
@@ -275,7 +270,6 @@ PARAMS = _packed(
         ("environment_width", np.uint32),
         ("environment_height", np.uint32),
         ("environment_rotation", np.float32),  # as a fraction of a full turn
-        ("object_count", np.uint32),
         ("pixel_center", np.uint32),  # 1: camera rays go through pixel centres (picking, AOVs)
     ]
 )

@@ -122,7 +122,7 @@ class Session:
         start = time.perf_counter()
         mode, queue = self._mode, self._queue
         plan = tiles.plan(self._grid, queue, self._cursor, self._slot_count(), self._tile_spp)
-        params = self._params(len(plan.slots))
+        params = self._params()
         slots = self.device.upload(plan.slots)
         paths = len(plan.slots) * self.settings.tile_size**2
         self._wavefront.trace(self._device_scene, params, slots, paths, self._radiance)
@@ -215,7 +215,7 @@ class Session:
         queue = tiles.Queue(tiles.base_queue(self._grid), 1, True)
         surface, object_ids = self._first_hits(
             tiles.plan(self._grid, queue, tiles.Cursor(), tile_count, self._tile_spp).slots,
-            self._params(tile_count),
+            self._params(),
         )
         surface = surface.reshape(7, height, width)
         return Aovs(
@@ -234,7 +234,7 @@ class Session:
             raise InputError(f"pixel ({x}, {y}): is outside the image of {width} x {height}")
         slot = np.zeros(1, layout.SLOT)
         slot["tile_x"], slot["tile_y"], slot["group_count"] = x, y, 1
-        params = self._params(1)
+        params = self._params()
         params["tile_size"] = 1
         _, object_ids = self._first_hits(slot, params)
         index = int(object_ids[y * width + x])
@@ -307,7 +307,7 @@ class Session:
         x, y = (low + high) / 2
         return float(x), float(y)
 
-    def _params(self, slot_count: int) -> npt.NDArray[np.void]:
+    def _params(self) -> npt.NDArray[np.void]:
         width, height = self.size
         scene, settings = self.scene, self.settings
         camera = scene.camera
@@ -317,7 +317,7 @@ class Session:
         )
         params["camera"] = (camera.position, right, up, forward)
         params["width"], params["height"] = width, height
-        params["tile_size"], params["slot_count"] = settings.tile_size, slot_count
+        params["tile_size"] = settings.tile_size
         params["buffer_stride"] = self._buffer_stride
         for name in ("seed", "max_bounces", "transmission_bounces", "roulette_depth"):
             params[name] = getattr(settings, name)
@@ -328,7 +328,6 @@ class Session:
             shape = scene.environment.image.pixels.shape
             params["environment_height"], params["environment_width"] = shape[:2]
         params["environment_rotation"] = scene.environment.rotation_y / 360 % 1
-        params["object_count"] = len(scene.objects)
         return params
 
 
