@@ -175,10 +175,15 @@ def render(
     seed: SeedOption = None,
     strategy: Annotated[str | None, typer.Option(help="restart or spiral.")] = None,
     max_bounces: BouncesOption = None,
+    aovs: Annotated[
+        bool, typer.Option("--aovs", help="Put object ids, normals, depth and base colours into the .exr.")
+    ] = False,
     device: DeviceOption = None,
 ) -> None:
     """Render a scene to a picture. Ctrl-C keeps what is done."""
     _check_picture_path(output)
+    if aovs and output.suffix.lower() != ".exr":
+        raise InputError(f"--aovs: {output} cannot hold them; use an .exr")
     scene = scene_io.load(scene_file)
     settings = _settings(scene, size=size, seed=seed, strategy=strategy, max_bounces=max_bounces)
     session = Session(scene, settings=settings, device=device)
@@ -198,7 +203,7 @@ def render(
             if not stop.requested:
                 raise
         # Still inside, so that another Ctrl-C does not tear the picture that is kept.
-        _write_picture(output, session)
+        _write_picture(output, session, aovs)
     samples = int(session.spp().min())
     if nonfinite:
         _complain(f"warning: {nonfinite:,} samples were not finite and count as black", 0)
@@ -345,8 +350,14 @@ def _check_folder(folder: Path) -> None:
         raise OutputError(f"{folder}: cannot be written; choose another folder")
 
 
-def _write_picture(path: Path, session: Session) -> None:
+def _write_picture(path: Path, session: Session, with_aovs: bool) -> None:
     if path.suffix.lower() == ".png":
         image_io.write_png(path, session.image())
-    else:
-        image_io.write_exr(path, {"RGB": session.image()})
+        return
+    layers: dict[str, Any] = {"RGB": session.image()}
+    if with_aovs:
+        aovs = session.aovs()
+        # Object ids are unsigned in OpenEXR; the largest one stands for "none".
+        layers |= {"albedo.RGB": aovs.albedo, "normal.XYZ": aovs.normal, "depth.Z": aovs.depth}
+        layers["object_id"] = aovs.object_id.view("uint32")
+    image_io.write_exr(path, layers)

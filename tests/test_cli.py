@@ -65,6 +65,24 @@ def only_line(text: str) -> str:
 # ------------------------------------------------------------------------------------------- render
 
 
+def test_render_puts_aovs_into_an_exr(
+    scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("render", scene_file, "-o", tmp_path / "a.exr", "--spp", 1, "--aovs") == 0
+    channels = OpenEXR.File(str(tmp_path / "a.exr")).channels()
+    expected = Session(scene_io.load(scene_file)).aovs()
+    ids = np.asarray(channels["object_id"].pixels)
+    np.testing.assert_array_equal(ids.view(np.int32), expected.object_id)
+    assert set(np.unique(ids)) == {0, 0xFFFFFFFF}
+    np.testing.assert_array_equal(np.asarray(channels["depth.Z"].pixels), expected.depth)
+    for axis, name in enumerate("XYZ"):
+        plane = np.asarray(channels[f"normal.{name}"].pixels)
+        np.testing.assert_array_equal(plane, expected.normal[..., axis])
+    capsys.readouterr()
+    assert run("render", scene_file, "-o", tmp_path / "a.png", "--aovs") == 2
+    assert "--aovs: " in capsys.readouterr().err and not (tmp_path / "a.png").exists()
+
+
 def test_render_writes_what_the_session_renders(scene_file: Path, tmp_path: Path) -> None:
     output = tmp_path / "out.exr"
     assert run("render", scene_file, "-o", output, "--spp", 4) == 0
