@@ -172,22 +172,38 @@ def test_devices_agree(device: Device) -> None:
 
 
 VECTORIZED = """
-import numpy as np, sys
-sys.path.insert(0, {tests!r})
-from small_scenes import mixed_scene
+import sys
+import numpy as np
+from incpt import layout
 from incpt.device import Device
-from incpt.session import Session
 
-launch = Device.launch
-def marked(self, kernel, *args, **options):
-    self.finish()
-    print("KERNEL", kernel.function_name, file=sys.stderr, flush=True)
-    launch(self, kernel, *args, **options)
-    self.finish()
-    print("KERNEL end", file=sys.stderr, flush=True)
-Device.launch = marked
-Session(mixed_scene(), size=(16, 16)).step()
+device = Device()
+floats = device.upload(np.zeros(1 << 18, np.float32))
+slots = np.zeros(64, layout.SLOT)
+slots["group_count"] = 1
+params = np.zeros((), layout.PARAMS)
+params["path_stride"] = params["buffer_stride"] = 1000
+for name in ("light_count", "environment_width", "environment_height", "tile_size", "width", "height"):
+    params[name] = 4
+for variant in {variants!r}:
+    name, *features = variant.split()
+    print("VARIANT", variant, file=sys.stderr, flush=True)
+    kernel = device.kernel(name, features=tuple(features))
+    first = (device.upload(slots),) if name == "generate" else (np.uint32(512),)
+    device.launch(kernel, 512, params, *first, *[floats] * (kernel.num_args - 2))
+    device.finish()
 """
+VARIANTS = [
+    "generate",
+    "escape",
+    "escape ENVIRONMENT_IMAGE",
+    "illuminate ENVIRONMENT_IMAGE",
+    "illuminate TRIANGLE_LIGHTS",
+    "illuminate ENVIRONMENT_IMAGE TRIANGLE_LIGHTS",
+    "shade",
+    "shade TRIANGLE_LIGHTS",
+    "shade EMISSION_ONLY",
+]
 
 
 def has_avx512() -> bool:
@@ -207,7 +223,7 @@ def test_pocl_runs_shading_in_simd_lanes(device: Device, tmp_path: Path) -> None
         "PYOPENCL_NO_CACHE": "1",
         DEVICE_VARIABLE: "Portable",
     }
-    script = VECTORIZED.format(tests=str(Path(__file__).parent))
+    script = VECTORIZED.format(variants=VARIANTS)
     done = subprocess.run(
         [sys.executable, "-c", script],
         env=environment,
@@ -215,12 +231,11 @@ def test_pocl_runs_shading_in_simd_lanes(device: Device, tmp_path: Path) -> None
         stderr=subprocess.STDOUT,
         check=True,
     )
-    remarks: dict[str, str] = {}
-    for part in done.stdout.decode(errors="replace").split("KERNEL ")[1:]:
-        name, _, text = part.partition("\n")
-        remarks[name] = remarks.get(name, "") + text
-    for name in ("generate", "illuminate", "shade", "escape"):
-        assert "vectorized loop (vectorization width: 8" in remarks[name], name
+    parts = done.stdout.decode(errors="replace").split("VARIANT ")[1:]
+    remarks = dict(part.split("\n", 1) for part in parts)
+    assert list(remarks) == VARIANTS
+    for variant, text in remarks.items():
+        assert "vectorized loop (vectorization width: 8" in text, variant
 
 
 def test_kernels_build_without_warnings(device: Device) -> None:
