@@ -36,7 +36,7 @@ class Tuning:
     work_group: int
 
 
-_CPU = Tuning(chunk_paths=1 << 16, work_group=layout.WORK_GROUP_SIZE)
+_CPU = Tuning(chunk_paths=1 << 17, work_group=layout.WORK_GROUP_SIZE)
 _GPU = Tuning(chunk_paths=1 << 20, work_group=layout.WORK_GROUP_SIZE)
 
 
