@@ -8,7 +8,8 @@ often each is repeated, and whether a finished tile replaces or refines what the
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -160,15 +161,17 @@ class Session:
         return change
 
     def configure(self, settings: RenderSettings) -> None:
-        """Render with other settings from now on. The picture starts over only if samples change meaning."""
-        old, self.settings = self.settings, settings
-        if (old.size, old.tile_size) != (settings.size, settings.tile_size):
-            self._start_film()
-        elif any(getattr(old, name) != getattr(settings, name) for name in _PICTURE_SETTINGS):
-            self._enter(Mode.BASE)
-        elif self._mode is not Mode.INCREMENTAL and self._cursor == tiles.Cursor():
-            self._enter(self._mode)
-        self._resize_path_buffer()
+        """Render with other settings from now on. The picture starts over only if samples change meaning.
+        On an error the old settings and the picture stay."""
+        with self._unchanged_on_error():
+            old, self.settings = self.settings, settings
+            if (old.size, old.tile_size) != (settings.size, settings.tile_size):
+                self._start_film()
+            elif any(getattr(old, name) != getattr(settings, name) for name in _PICTURE_SETTINGS):
+                self._enter(Mode.BASE)
+            elif self._mode is not Mode.INCREMENTAL and self._cursor == tiles.Cursor():
+                self._enter(self._mode)
+            self._resize_path_buffer()
 
     def render(self, spp: int, on_step: Callable[[StepReport], None] | None = None) -> None:
         """Step until every pixel shows the scene as it is now with at least `spp` samples."""
@@ -190,14 +193,17 @@ class Session:
         )
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go on from where a session stood. A tile that was under way then starts again."""
-        self._device_scene.update(snapshot.scene)
-        self.settings = snapshot.settings
-        self._start_film()
-        self._film.restore(snapshot.sums)
-        self._tile_spp = snapshot.tile_spp.copy()
-        self._mode, self._queue = snapshot.mode, snapshot.queue
-        self._cursor = tiles.Cursor(snapshot.cursor.tiles)
+        """Go on from where a session stood. A tile that was under way then starts again. On an error
+        everything stays as it was."""
+        with self._unchanged_on_error():
+            self.settings = snapshot.settings
+            self._start_film()
+            self._film.restore(snapshot.sums)
+            self._tile_spp = snapshot.tile_spp.copy()
+            self._mode, self._queue = snapshot.mode, snapshot.queue
+            self._cursor = tiles.Cursor(snapshot.cursor.tiles)
+            # Last, since the scene on the device is not put back here.
+            self._device_scene.update(snapshot.scene)
 
     def image(self) -> npt.NDArray[np.float32]:
         """(H, W, 3) mean radiance, linear; row 0 is on top. What is not rendered anew yet shows the old
@@ -257,6 +263,16 @@ class Session:
             self.device.read(object_ids, np.empty(pixels, np.int32)),
         )
 
+    @contextmanager
+    def _unchanged_on_error(self) -> Iterator[None]:
+        # A path buffer that is smaller than the settings say would be written past its end.
+        before = self.__dict__.copy()
+        try:
+            yield
+        except BaseException:
+            self.__dict__ = before
+            raise
+
     def _start_film(self) -> None:
         width, height = self.size
         self._grid = tiles.TileGrid(width, height, self.settings.tile_size)
@@ -285,7 +301,7 @@ class Session:
         else:
             order = tiles.base_queue(self._grid)
         if mode is Mode.BASE:
-            self._tile_spp[:] = 0
+            self._tile_spp = np.zeros_like(self._tile_spp)
         repetitions = self.settings.nor if incremental else self.settings.base_nor
         self._queue = tiles.Queue(order, repetitions * self.settings.sample_rate, mode is not Mode.REFINE)
 

@@ -9,7 +9,7 @@ import pytest
 from small_scenes import mixed_scene, small_settings
 
 from incpt.device import Device
-from incpt.errors import InputError
+from incpt.errors import DeviceError, InputError
 from incpt.modes import Mode
 from incpt.scene import Object, Scene, shape
 from incpt.session import Session
@@ -258,6 +258,30 @@ def test_another_size_starts_a_new_film(device: Device) -> None:
     assert not session.image().any() and session.image().shape == (20, 30, 3)
     session.render(2)
     assert_same(session.image(), rendered(device, mixed_scene(size=(30, 20)), 2).image())
+
+
+@pytest.mark.parametrize("change", [{"sample_rate": 4}, {"size": (90, 50)}, {"tile_size": 16}])
+def test_failed_configure_keeps_settings_and_picture(
+    device: Device, monkeypatch: pytest.MonkeyPatch, change: dict[str, object]
+) -> None:
+    session = rendered(device, mixed_scene(), 2)
+    before, settings = session.image(), session.settings
+    other = Session(mixed_scene(**change).with_object("red cube", visible=False), device=device).snapshot()
+    scene = session.scene
+
+    def fail(_: int) -> None:
+        raise DeviceError("no memory")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(device, "empty", fail)
+        with pytest.raises(DeviceError):
+            session.configure(replace(settings, **change))
+        with pytest.raises(DeviceError):
+            session.restore(other)
+    assert session.settings is settings and session.scene is scene and session.mode is Mode.REFINE
+    np.testing.assert_array_equal(session.image(), before)
+    session.render(4)
+    assert_same(session.image(), rendered(device, mixed_scene(), 4).image())
 
 
 def test_snapshot_brings_the_picture_back(device: Device) -> None:
