@@ -63,7 +63,7 @@ def camera_frame(
 ) -> tuple[Array, Array, Array]:
     """(right, up, forward), each (3,): the image plane at unit distance, half its width and height long."""
     forward = _unit(np.subtract(target, position))
-    right = np.cross(forward, np.asarray(up, np.float64))
+    right = np.cross(forward, _unit(np.asarray(up, np.float64)))
     if np.linalg.norm(right) < 1e-9:  # looking along `up`: any other axis gives a frame
         right = np.cross(forward, [0.0, 0.0, 1.0] if abs(forward[2]) < 0.9 else [1.0, 0.0, 0.0])
     right = _unit(right)

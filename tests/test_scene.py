@@ -219,3 +219,12 @@ def test_looking_along_up_still_gives_a_frame(target: tuple[float, float, float]
     assert abs(right @ up) < 1e-12 and abs(right @ forward) < 1e-12 and np.linalg.norm(right) > 0.1
     right, up, forward = transform.camera_frame((0, 0, 0), (0, 0, 3), (0, 0, 1), 60, 1.0)
     assert np.isfinite(right).all() and abs(up @ forward) < 1e-12
+
+
+@pytest.mark.parametrize("length", [2e-9, 1.0, 1e9])
+def test_length_of_up_does_not_matter(length: float) -> None:
+    for target, up in (((0, 0.98, 0.17), (0, 1, 0)), ((0.3, 0.5, 0.8), (0.3, 0.5, 0.8))):
+        scaled = tuple(length * c for c in up)
+        frame = transform.camera_frame((0, 0, 0), target, scaled, 90, 1.0)
+        np.testing.assert_allclose(frame, transform.camera_frame((0, 0, 0), target, up, 90, 1.0), atol=1e-9)
+        np.testing.assert_allclose(np.array(frame) @ np.transpose(frame), np.eye(3), atol=1e-9)
