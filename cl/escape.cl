@@ -1,10 +1,13 @@
 #include "light.cl"
+#include "medium.cl"
 
 // Radiance from far away for the paths whose ray left the scene, weighted against light sampling of the
-// environment. Their end.
+// environment. Their end. The variant MEDIA serves scenes with transparent bodies: from inside one that is
+// open, a ray leaves through an endless stretch of its medium, as a shadow ray to the environment does.
 __kernel void escape(const Params params, const uint count, __global const uint *list,
-                     __global const float *environment_image, __global const float *environment_pdf,
-                     __global const float *rays, __global const float *paths, __global float *radiance) {
+                     __global const Material *materials, __global const float *environment_image,
+                     __global const float *environment_pdf, __global const float *rays,
+                     __global const float *paths, __global float *radiance) {
     uint stride = params.path_stride;
     uint item = (uint)get_global_id(0);
     int listed = item < count;
@@ -16,6 +19,10 @@ __kernel void escape(const Params params, const uint count, __global const uint 
 
     Vec3 direction = load3(rays + RAY_DIRECTION_X * stride, stride, path);
     Vec3 throughput = load3(paths + PATH_THROUGHPUT_R * stride, stride, path);
+#ifdef MEDIA
+    uint medium = load_medium_stack((__global const uint *)paths, stride, path).entry[0];
+    throughput = times(throughput, transmittance(materials, medium, INFINITY));
+#endif
     float bsdf_pdf = paths[PATH_BSDF_PDF * stride + path];
     float light_pdf;
     Vec3 arriving = eval_environment(&params, &emitters, direction, &light_pdf);

@@ -4,7 +4,7 @@ Instead of one kernel with the path loop, each stage of all paths runs as a kern
 of the paths that need it: a terminated path costs nothing more, and on PoCL the straight-line stages run
 in SIMD lanes. Paths are traced in chunks whose state fits the caches of a CPU.
 
-    generate -> [ intersect -> escape, medium_shade, illuminate, shade -> occlude ] once a ray -> radiance
+    generate -> [ intersect -> escape, illuminate, medium_shade, shade -> occlude ] once a ray -> radiance
 """
 
 from __future__ import annotations
@@ -119,8 +119,9 @@ class Wavefront:
         if escaped_count and any(scene.environment_radiance):
             self._launch(
                 "escape", escaped_count, params, np.uint32(escaped_count), self._escaped,
-                scene.buffer("environment_image"), scene.buffer("texel_pdf"), self._rays, self._paths,
-                radiance, features=scene.features,
+                scene.buffer("materials"), scene.buffer("environment_image"), scene.buffer("texel_pdf"),
+                self._rays, self._paths, radiance,
+                features=(*scene.features, *(("MEDIA",) if scene.has_media else ())),
             )  # fmt: skip
         # Without media every ray is a scattering event, so that all paths end with the same one.
         last = not scene.has_media and ray > int(params["max_bounces"])

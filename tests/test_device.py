@@ -240,7 +240,7 @@ def test_pocl_runs_shading_in_simd_lanes(device: Device, tmp_path: Path) -> None
 
 def test_kernels_build_without_warnings(device: Device) -> None:
     lights = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS")
-    variants = [(), lights[:1], lights[1:], lights, ("EMISSION_ONLY",)]
+    variants = [(), lights[:1], lights[1:], lights, ("EMISSION_ONLY",), ("MEDIA",)]
     for file in sorted(path.stem for path in (Path(layout.__file__).parent.parent / "cl").glob("*.cl")):
         if "__kernel" not in source(file):
             continue

@@ -500,6 +500,19 @@ def test_absorption_of_a_slab(angle: float) -> None:
     np.testing.assert_allclose(_layers(bodies, angle, False), reflected, atol=3e-3)
 
 
+@pytest.mark.parametrize("roughness", [0.0, 0.5])
+@pytest.mark.parametrize("image", [None, Image(np.ones((4, 8, 3)))])
+def test_nothing_arrives_through_an_endless_medium(roughness: float, image: Image | None) -> None:
+    """A single sheet has no far side: light from there came through an infinite length of glass."""
+    glass = Material((1, 1, 1), roughness=roughness, transmission=1, specular=0, absorption=(0, 1, 2))
+    scene = Scene(
+        Camera((0, 3, 0), (0, 0, 0), fov_y=20), Environment(color=(1, 1, 1), image=image),
+        {"glass": glass}, (Object("sheet", shape("plane"), "glass", scale=(9, 1, 9)),),
+    )  # fmt: skip
+    mean = render(scene, 16, max_bounces=1).mean(axis=(0, 1))
+    assert mean[0] > 0.3 and not mean[1:].any()
+
+
 _GLASS, _LIQUID = (2.0, (0.2, 0.4, 0.0)), (1.333, (0.0, 1.0, 2.0))
 
 
