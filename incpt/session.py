@@ -30,11 +30,15 @@ _PICTURE_SETTINGS = (
     "size", "max_bounces", "transmission_bounces", "roulette_depth", "tile_size", "seed",
 )  # fmt: skip
 
+# Kernels index the three planes of the path buffer with 32 bits.
+_MOST_PATH_FLOATS = 1 << 32
+
 
 @dataclass(frozen=True)
 class StepReport:
     """What a step did: its mode, the tiles it finished, the place in the queue after it (in tiles), the
-    paths it traced, its duration in seconds, and how many samples were not finite (they count as black)."""
+    paths it traced (those past the image's edge included), its duration in seconds, and how many samples were
+    not finite (they count as black)."""
 
     mode: Mode
     tiles: npt.NDArray[np.int32]
@@ -73,7 +77,8 @@ class Session:
     """Renders `scene` at `size` (width, height; the settings' by default) with `settings` (the scene's own
     by default) on `device` (a Device, or what chooses one: see `Device`).
 
-    Raises InputError for a device that is not there, DeviceError where it cannot do the work.
+    Raises InputError for a device that is not there or a step that is too large, DeviceError where the
+    device cannot do the work.
     """
 
     def __init__(
@@ -288,6 +293,12 @@ class Session:
 
     def _resize_path_buffer(self) -> None:
         stride = path_buffer_stride(self._slot_count(), self.settings.tile_size)
+        if 3 * stride > _MOST_PATH_FLOATS:
+            most = (_MOST_PATH_FLOATS // 3 - layout.WORK_GROUP_SIZE) // self.settings.tile_size**2
+            raise InputError(
+                f"sample_rate: a step of {self._slot_count():,} slots is more than the {most:,} that can be "
+                f"addressed; choose a smaller sample_rate or slots_per_step"
+            )
         if stride != self._buffer_stride:
             self._radiance = self.device.empty(12 * stride)
             self._buffer_stride = stride

@@ -284,6 +284,16 @@ def test_failed_configure_keeps_settings_and_picture(
     assert_same(session.image(), rendered(device, mixed_scene(), 4).image())
 
 
+def test_step_beyond_32_bits_is_refused(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = rendered(device, mixed_scene(), 2)
+    # As a device with memory enough would do.
+    monkeypatch.setattr(device, "empty", lambda _: session._radiance)
+    largest = ((1 << 32) // 3 - 64) // 64
+    session.configure(replace(session.settings, slots_per_step=largest // 4096, sample_rate=4096))
+    with pytest.raises(InputError, match=r"^sample_rate: a step of .* slots is more"):
+        session.configure(replace(session.settings, slots_per_step=largest // 4096 + 1))
+
+
 def test_snapshot_brings_the_picture_back(device: Device) -> None:
     session = rendered(device, mixed_scene(), 3)
     snapshot, before = session.snapshot(), session.image()
