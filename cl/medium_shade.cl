@@ -122,7 +122,7 @@ __kernel void medium_shade(const Params params, const uint count, __global const
     bounces += !covered && !passage;
     passages += !covered && passage;
     throughput = times(throughput, next.weight);
-    float survival = survival_probability(throughput, bounces, params.roulette_depth);
+    float survival = survival_probability(throughput, counts & 0xffu, params.roulette_depth);
     int goes_on = possible && bounces <= params.max_bounces + 1u && passages <= params.transmission_bounces &&
                   ray < 250u && largest(throughput) > 0.0f && luck.u < survival;
 

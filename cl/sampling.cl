@@ -73,7 +73,7 @@ INLINE float mis_weight(float pdf, float other_pdf) {
     return 1.0f / (1.0f + ratio * ratio);
 }
 
-// Chance that Russian roulette lets a path go on after `bounces` scattering events.
+// Chance that Russian roulette lets a path go on that had `bounces` scattering events before this one.
 INLINE float survival_probability(Vec3 throughput, uint bounces, uint roulette_depth) {
     float share = CLAMP(largest(throughput), 0.05f, 1.0f);
     return bounces >= roulette_depth ? share : 1.0f;

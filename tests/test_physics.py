@@ -500,6 +500,14 @@ def test_absorption_of_a_slab(angle: float) -> None:
     np.testing.assert_allclose(_layers(bodies, angle, False), reflected, atol=3e-3)
 
 
+@pytest.mark.parametrize("transmission", [0.0, 1.0])
+def test_roulette_spares_the_first_scattering_events(transmission: float) -> None:
+    material = Material((0.3, 0.3, 0.3), roughness=0.6, transmission=transmission)
+    scene = one_object(material, "plane")
+    early, never = (render(scene, 4, max_bounces=0, roulette_depth=depth) for depth in (1, 255))
+    np.testing.assert_array_equal(early, never)
+
+
 @pytest.mark.parametrize("roughness", [0.0, 0.5])
 @pytest.mark.parametrize("image", [None, Image(np.ones((4, 8, 3)))])
 def test_nothing_arrives_through_an_endless_medium(roughness: float, image: Image | None) -> None:
