@@ -26,9 +26,7 @@ from incpt.settings import RenderSettings
 from incpt.wavefront import Wavefront
 
 # Settings that change what a sample is worth, so that what was accumulated cannot be kept.
-_PICTURE_SETTINGS = (
-    "size", "max_bounces", "transmission_bounces", "roulette_depth", "tile_size", "seed",
-)  # fmt: skip
+_PICTURE_SETTINGS = ("max_bounces", "transmission_bounces", "roulette_depth", "seed")
 
 # Kernels index the three planes of the path buffer with 32 bits.
 _MOST_PATH_FLOATS = 1 << 32
