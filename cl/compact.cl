@@ -1,6 +1,3 @@
-// Entries that one work-item looks at: few atomics, and enough work-items for a GPU.
-#define COMPACT_BLOCK 64u
-
 // Appends the paths of `list` (all paths up to `count` where `all` is 1) to up to three lists, by the class
 // that each list asks for; the lengths go to counters[0 .. 2], which the caller has set. Terminated paths so
 // cost nothing from here on. The order of the blocks depends on the device's timing; no result does, since a

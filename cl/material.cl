@@ -11,9 +11,6 @@
 // reach the base, in both directions, so that a white base under a lossless layer reflects exactly
 // everything and the whole stays reciprocal (Kelemen and Szirmay-Kalos 2001).
 
-// Below it GGX is a mirror to float precision; a dielectric is smooth, a metal stays this rough.
-#define MIN_ALPHA 1e-3f
-
 typedef struct {
     Vec3 base;    // albedo of the Lambertian part, without the layer's share
     Vec3 f0, f90; // specular reflectance at normal and at grazing incidence

@@ -14,14 +14,12 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from incpt.layout import ALBEDO_TABLE_SIZE
+from incpt.layout import ALBEDO_TABLE_SIZE, MIN_ALPHA
 from incpt.scene import Material
 
 Array = npt.NDArray[np.floating]
 
 _SAMPLES = 1024
-MIN_ALPHA = 1e-3
-"""Least GGX alpha of an opaque surface, as in cl/material.cl."""
 
 
 @lru_cache(maxsize=1)

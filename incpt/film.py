@@ -66,5 +66,5 @@ def tile_image(grid: TileGrid, per_tile: npt.NDArray[np.integer]) -> npt.NDArray
 
 
 def path_buffer_stride(slot_count: int, tile_size: int) -> int:
-    """Floats per plane of a path buffer for `slot_count` slots: one more, where idle lanes may write."""
+    """Floats per plane of a path buffer for `slot_count` slots, and room where idle lanes may write."""
     return slot_count * tile_size**2 + layout.WORK_GROUP_SIZE

@@ -34,6 +34,13 @@ NO_INDEX = 0xFFFFFFFF
 WORK_GROUP_SIZE = 64
 """Work-items per group of the path kernels; lists of paths are padded to a multiple of it."""
 
+COMPACT_BLOCK = 64
+"""Paths that one work-item of `compact` looks at: few atomics, and enough work-items for a GPU."""
+
+MIN_ALPHA = 1e-3
+"""Least GGX alpha: below it GGX is a mirror to float precision. A dielectric is smooth there, an opaque
+surface stays this rough."""
+
 MEDIUM_STACK_SIZE = 4
 """Dielectrics that may enclose a point at the same time (Falcor keeps two)."""
 MEDIUM_NONE = 0xFFFF
@@ -307,8 +314,8 @@ def _c_struct(name: str, dtype: np.dtype[np.void]) -> str:
     return f"typedef struct {{\n{body}\n}} {name};\n{check}"
 
 
-def _c_constant(name: str, value: int) -> str:
-    return f"#define {name} {value}u"
+def _c_constant(name: str, value: int | float) -> str:
+    return f"#define {name} {value}{'u' if isinstance(value, int) else 'f'}"
 
 
 def _c_enum(enum: type[IntEnum] | type[IntFlag], prefix: str) -> list[str]:
@@ -320,7 +327,7 @@ def c_header() -> str:
     lines = [
         _c_constant(name, value)
         for name, value in sorted(globals().items())
-        if name.isupper() and not name.startswith("_") and isinstance(value, int)
+        if name.isupper() and not name.startswith("_") and isinstance(value, int | float)
     ]
     for enum, prefix in (
         (RayPlane, "RAY"),

@@ -19,7 +19,6 @@ from incpt import layout
 from incpt.device import Device
 from incpt.device_scene import DeviceScene
 
-_COMPACT_BLOCK = 64  # COMPACT_BLOCK in cl/compact.cl
 _MOST_LISTS = 3
 _MOST_RAYS = 256
 """Bound on the rays of a path; kernels end paths before it."""
@@ -58,10 +57,9 @@ class Wavefront:
         planes of params["buffer_stride"] floats."""
         for first in range(0, path_count, self.chunk_paths):
             chunk = self._chunk_params(params, first, path_count)
-            self._launch(
-                "generate", self.chunk_paths_of(chunk), chunk, slots, self._rays, self._paths, radiance
-            )
-            count = self._compact(chunk, self.chunk_paths_of(chunk), None, (_Class.LIVE, self._live))[0]
+            size = int(chunk["path_count"])
+            self._launch("generate", size, chunk, slots, self._rays, self._paths, radiance)
+            count = self._compact(chunk, size, None, (_Class.LIVE, self._live))[0]
             for ray in range(_MOST_RAYS):
                 if count == 0:
                     break
@@ -81,7 +79,7 @@ class Wavefront:
         pixels = np.uint32(int(params["width"]) * int(params["height"]))
         for first in range(0, path_count, self.chunk_paths):
             chunk = self._chunk_params(params, first, path_count)
-            size = self.chunk_paths_of(chunk)
+            size = int(chunk["path_count"])
             self._launch("generate", size, chunk, slots, self._rays, self._paths, radiance)
             count = self._compact(chunk, size, None, (_Class.LIVE, self._live))[0]
             self._intersect(scene, chunk, count)
@@ -89,10 +87,6 @@ class Wavefront:
                 "aov", size, chunk, pixels, scene.buffer("materials"), self._hits, self._paths, surface,
                 object_ids,
             )  # fmt: skip
-
-    @staticmethod
-    def chunk_paths_of(chunk: npt.NDArray[np.void]) -> int:
-        return int(chunk["path_count"])
 
     def _chunk_params(
         self, params: npt.NDArray[np.void], first: int, path_count: int
@@ -192,7 +186,7 @@ class Wavefront:
         unused = (_Class(0), self._escaped)
         targets = (*lists, unused, unused)[:_MOST_LISTS]
         self._launch(
-            "compact", -(-count // _COMPACT_BLOCK), params, np.uint32(count), np.uint32(source is None),
+            "compact", -(-count // layout.COMPACT_BLOCK), params, np.uint32(count), np.uint32(source is None),
             source or self._live, self._paths,
             *(arg for bits, target in targets for arg in (np.uint32(bits), target)), self._counters,
         )  # fmt: skip

@@ -177,7 +177,7 @@ def test_samples_estimate_the_integral(angle: float) -> None:
 def _single_scattering(roughness: float, cosine: float) -> tuple[float, float]:
     """A and B of albedo.table by a sum over the hemisphere of half vectors, in double precision: GGX,
     height-correlated Smith, reflectance 1 (A) and (1 - <wo, h>)^5 (B)."""
-    alpha2 = max(roughness**2, albedo.MIN_ALPHA) ** 2
+    alpha2 = max(roughness**2, layout.MIN_ALPHA) ** 2
     # tan^2 of the half vector's angle by GGX's own distribution, so that all alphas are resolved alike.
     n, m = 1500, 300
     s = (np.arange(n) + 0.5) / n

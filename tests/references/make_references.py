@@ -22,7 +22,7 @@ sys.path.insert(0, str(HERE.parent))
 
 from reference_scenes import REFERENCES, SIZE, Reference  # noqa: E402
 
-from incpt.albedo import MIN_ALPHA  # noqa: E402
+from incpt.layout import MIN_ALPHA  # noqa: E402
 from incpt.scene import Camera, Environment, Material, Object  # noqa: E402
 
 RENDERS = 16
