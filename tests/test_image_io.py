@@ -187,6 +187,13 @@ def test_mid_grey_stays_mid_grey() -> None:
     np.testing.assert_array_equal(image_io.tone_map(mid, exposure=1), image_io.tone_map(mid * 2))
 
 
+def test_the_filmic_curve_is_that_of_its_author() -> None:
+    """f(x) = ((x (0.15 x + 0.05) + 0.004) / (x (0.15 x + 0.5) + 0.06) - 1/15) of 2 L over f(11.2), worked
+    out for L = 0.18: 0.093062 / 0.725129 = 0.128338, which sRGB encodes as 0.393471, 100.3 of 255."""
+    mapped = image_io.tone_map(np.outer([0.18, 1.0, 5.0, 5.6, 1e6], [1, 1, 1]), curve="filmic")
+    assert mapped[:, 0].tolist() == [100, 186, 252, 255, 255]
+
+
 def test_a_bright_colour_runs_into_white() -> None:
     red = np.array([1.0, 0.02, 0.02])
     mapped = image_io.tone_map(np.stack([red, red * 1000])).astype(int)
@@ -197,8 +204,8 @@ def test_a_bright_colour_runs_into_white() -> None:
 def test_pixels_that_are_no_radiance_are_seen() -> None:
     mapped = image_io.tone_map([[np.nan, 0, 0], [np.inf] * 3, [-np.inf, -1, -5]])
     assert mapped.tolist() == [[255, 0, 255], [255, 255, 255], [0, 0, 0]]
-    with pytest.raises(InputError, match="curve: 'filmic' is not known"):
-        image_io.tone_map([[0, 0, 0]], curve="filmic")
+    with pytest.raises(InputError, match="curve: 'reinhard' is not known"):
+        image_io.tone_map([[0, 0, 0]], curve="reinhard")
     with pytest.raises(InputError, match="shape"):
         image_io.tone_map([[0, 0]])
 

@@ -1,0 +1,431 @@
+"""The picture on the screen: linear radiance in textures, tone-mapped on the GPU, under overlays, a tile
+grid, the outline of the selection and the bar of a split view. Changes nothing of what was rendered."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import moderngl
+import numpy as np
+
+from incpt import image_io
+from incpt.ui import overlays
+from incpt.ui.outline import FULL_SCREEN, Outline, Outlined, Rect, inside, viewport_of
+
+if TYPE_CHECKING:
+    from incpt.live import Picture
+    from incpt.session import Aovs
+    from incpt.ui.overlays import Overlay
+    from incpt.ui.preferences import DisplaySettings
+
+NEAREST_FROM = 2.0
+"""Magnification from which pixels are shown as squares."""
+GRID_MIN_PX, GRID_FULL_PX = 3.0, 10.0
+"""Distance of tile lines below which there are none, and from which they are at full strength."""
+BAR_PX, GRIP_PX = 2.0, (10.0, 44.0)
+"""Width of the split bar, and width and height of its grip, at a DPI scale of 1."""
+
+
+def _glsl(values: object) -> str:
+    return ", ".join(f"{value:.9g}" for value in np.ravel(np.asarray(values, np.float64)))
+
+
+# The constants of incpt.image_io. GLSL takes matrices column by column.
+_CURVES = f"""
+const mat3 agx_inset = mat3({_glsl(image_io.AGX_INSET.T)});
+const mat3 agx_outset = mat3({_glsl(image_io.AGX_OUTSET.T)});
+const vec2 agx_log2_range = vec2({_glsl(image_io.AGX_LOG2_RANGE)});
+const float agx_polynomial[7] = float[7]({_glsl(image_io.AGX_POLYNOMIAL)});
+const float hable[6] = float[6]({_glsl(image_io.HABLE_CURVE)});
+const float hable_white = {_glsl(image_io.HABLE_WHITE)};
+const float hable_bias = {_glsl(image_io.HABLE_EXPOSURE_BIAS)};
+const vec3 undefined_pixel = vec3({_glsl(np.array(image_io.UNDEFINED_PIXEL) / 255)});
+"""
+
+_TONE_MAP = f"""#version 330 core
+{_CURVES}
+uniform sampler2D picture;
+uniform sampler2D underlay;
+uniform bool has_underlay;
+uniform vec3 nothing;
+uniform float factor;
+uniform int curve;
+out vec4 result;
+
+vec3 srgb(vec3 x) {{
+    x = min(x, 1.0);
+    vec3 curved = 1.055 * pow(max(x, 1e-10), vec3(1.0 / 2.4)) - 0.055;
+    return mix(12.92 * x, curved, greaterThan(x, vec3(0.0031308)));
+}}
+
+vec3 agx(vec3 linear) {{
+    vec3 inset = max(agx_inset * linear, 1e-10);
+    vec3 x = (log2(inset) - agx_log2_range.x) / (agx_log2_range.y - agx_log2_range.x);
+    x = clamp(x, 0.0, 1.0);
+    vec3 y = vec3(agx_polynomial[0]);
+    for (int i = 1; i < 7; i++)
+        y = y * x + agx_polynomial[i];
+    return agx_outset * y;
+}}
+
+vec3 hable_curve(vec3 x) {{
+    return (x * (hable[0] * x + hable[2] * hable[1]) + hable[3] * hable[4])
+           / (x * (hable[0] * x + hable[1]) + hable[3] * hable[5]) - hable[4] / hable[5];
+}}
+
+vec3 filmic(vec3 linear) {{
+    return srgb(hable_curve(min(linear * hable_bias, hable_white)) / hable_curve(vec3(hable_white)));
+}}
+
+void main() {{
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    vec4 radiance = texelFetch(picture, pixel, 0);
+    if (radiance.a == 0.0) {{
+        if (!has_underlay) {{
+            result = vec4(nothing, 1.0);
+            return;
+        }}
+        radiance = texture(underlay, gl_FragCoord.xy / vec2(textureSize(picture, 0)));
+    }}
+    // A comparison with NaN may be optimised away; its bits cannot be mistaken.
+    uvec3 bits = floatBitsToUint(radiance.rgb) & 0x7fffffffu;
+    if (any(greaterThan(bits, uvec3(0x7f800000u)))) {{
+        result = vec4(undefined_pixel, 1.0);
+        return;
+    }}
+    vec3 linear = min(clamp(radiance.rgb, 0.0, 1e30) * factor, 1e30);
+    result = vec4(curve == 0 ? agx(linear) : curve == 1 ? filmic(linear) : srgb(linear), 1.0);
+}}
+"""
+
+_SHADER_CURVES = {"agx": 0, "filmic": 1, "srgb": 2}
+
+# Positions count from the top left, as in the image; `rect` is where the image lies in the framebuffer.
+_COMPOSE = """#version 330 core
+uniform sampler2D mapped;
+uniform sampler2D overlay;
+uniform float opacity;
+uniform vec2 overlay_extent;
+uniform vec4 rect;
+uniform float framebuffer_height;
+uniform bool nearest;
+uniform float tile_size;
+uniform vec2 grid_scale;
+uniform float grid_strength;
+out vec4 result;
+
+bool on_line(float at, float origin, float step, float extent) {
+    // Each line falls into exactly one pixel, whatever the zoom: that which holds the line itself.
+    float line = round((at - origin) / step);
+    float place = line * step;
+    return line >= 1.0 && place < extent - 0.5 && floor(origin + place + 0.01) == floor(at);
+}
+
+void main() {
+    vec2 at = vec2(gl_FragCoord.x, framebuffer_height - gl_FragCoord.y);
+    vec2 unit = (at - rect.xy) / rect.zw;
+    if (any(lessThan(unit, vec2(0.0))) || any(greaterThanEqual(unit, vec2(1.0))))
+        discard;
+    vec2 size = vec2(textureSize(mapped, 0));
+    vec3 color = nearest ? texelFetch(mapped, ivec2(unit * size), 0).rgb : texture(mapped, unit).rgb;
+    if (opacity > 0.0) {
+        vec2 texel = unit * size / overlay_extent * vec2(textureSize(overlay, 0));
+        vec4 over = texelFetch(overlay, ivec2(texel), 0);
+        color = mix(color, over.rgb, over.a * opacity);
+    }
+    if (grid_strength > 0.0) {
+        vec2 step = tile_size * grid_scale;
+        if (on_line(at.x, rect.x, step.x, rect.z) || on_line(at.y, rect.y, step.y, rect.w)) {
+            float luma = dot(color, vec3(0.2126, 0.7152, 0.0722));
+            color = mix(color, vec3(luma < 0.5 ? 1.0 : 0.0), grid_strength);
+        }
+    }
+    result = vec4(color, 1.0);
+}
+"""
+
+_BAR = """#version 330 core
+uniform vec2 center;
+uniform vec2 grip;
+uniform float half_width;
+uniform float rim;
+uniform float framebuffer_height;
+out vec4 result;
+
+float outside_grip(vec2 offset) {
+    vec2 q = abs(offset) - (grip - grip.x);
+    return length(max(q, 0.0)) + min(max(q.x, q.y), 0.0) - grip.x;
+}
+
+void main() {
+    vec2 at = vec2(gl_FragCoord.x, framebuffer_height - gl_FragCoord.y);
+    vec2 offset = at - center;
+    float far = min(abs(offset.x) - half_width, outside_grip(offset));
+    float white = clamp(0.5 - far, 0.0, 1.0);
+    float dark = clamp(0.5 + rim - far, 0.0, 1.0) * 0.55;
+    // Two grooves in the grip.
+    float groove = abs(abs(offset.x) - grip.x * 0.32) < 0.5 * rim && abs(offset.y) < grip.y * 0.4 ? 0.5 : 0.0;
+    result = vec4(vec3(0.96 - groove) * white / max(white, dark), max(white, dark));
+}
+"""
+
+
+class _Side:
+    """One picture on the GPU: its radiance, what shows through where it has none yet, and the result of tone
+    mapping at its own size."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self._context = context
+        self.picture: Picture | None = None
+        self.radiance: moderngl.Texture | None = None
+        self.underlay: moderngl.Texture | None = None
+        self.mapped: moderngl.Texture | None = None
+        self.target: moderngl.Framebuffer | None = None
+        self.mapped_with: tuple[float, str] | None = None
+        self.overlay: Overlay | None = None
+        self.overlay_texture: moderngl.Texture | None = None
+        self.overlay_of: tuple[str, Picture, Aovs | None] | None = None
+
+    def upload(self, picture: Picture) -> None:
+        old = self.picture
+        self.picture = picture
+        if old is not None and old.image is picture.image:
+            return
+        height, width = picture.image.shape[:2]
+        if self.radiance is None or self.radiance.size != (width, height):
+            self._resize(width, height, old)
+        assert self.radiance is not None
+        self.radiance.write(np.ascontiguousarray(picture.image, np.float32))
+        self.mapped_with = None
+        if self.underlay is not None and _is_complete(picture):
+            self.underlay.release()
+            self.underlay = None
+
+    def _resize(self, width: int, height: int, old: Picture | None) -> None:
+        if self.radiance is not None:
+            if old is not None and _is_complete(old):
+                self.underlay, self.radiance = self.radiance, self.underlay
+            if self.radiance is not None:
+                self.radiance.release()
+        for resource in (self.mapped, self.target):
+            if resource is not None:
+                resource.release()
+        self.radiance = self._context.texture((width, height), 4, dtype="f4")
+        self.mapped = self._context.texture((width, height), 4)
+        self.mapped.repeat_x = self.mapped.repeat_y = False
+        self.target = self._context.framebuffer([self.mapped])
+        if self.underlay is not None:
+            self.underlay.repeat_x = self.underlay.repeat_y = False
+            self.underlay.filter = (moderngl.LINEAR, moderngl.LINEAR)
+
+    def lay_over(self, kind: str, aovs: Aovs | None) -> None:
+        """Makes the overlay texture that of `kind`, unless it is there already."""
+        assert self.picture is not None
+        key = (kind, self.picture, aovs)
+        if self.overlay_of is not None and all(a is b for a, b in zip(key, self.overlay_of, strict=True)):
+            return
+        self.overlay = overlays.build(kind, self.picture, aovs)
+        self.overlay_of = key
+        if self.overlay is None:
+            return
+        height, width = self.overlay.image.shape[:2]
+        if self.overlay_texture is None or self.overlay_texture.size != (width, height):
+            if self.overlay_texture is not None:
+                self.overlay_texture.release()
+            self.overlay_texture = self._context.texture((width, height), 4)
+        self.overlay_texture.write(np.ascontiguousarray(self.overlay.image))
+
+    def release(self) -> None:
+        for resource in (self.radiance, self.underlay, self.mapped, self.target, self.overlay_texture):
+            if resource is not None:
+                resource.release()
+
+
+class Display:
+    """Shows pictures in an OpenGL 3.3 core context. All calls belong to the thread of that context."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self._context = context
+        self._tone_map = context.program(vertex_shader=FULL_SCREEN, fragment_shader=_TONE_MAP)
+        self._compose = context.program(vertex_shader=FULL_SCREEN, fragment_shader=_COMPOSE)
+        self._bar = context.program(vertex_shader=FULL_SCREEN, fragment_shader=_BAR)
+        self._programs = (self._tone_map, self._compose, self._bar)
+        self._arrays = {p: context.vertex_array(p, []) for p in self._programs}
+        self._outline = Outline(context)
+        self._sides: list[_Side] = []
+        self._aovs: Aovs | None = None
+        self.background = (0.11, 0.11, 0.115)
+        """Colour of pixels that have no sample yet and nothing to show instead, sRGB."""
+
+    def upload(self, pictures: Sequence[Picture], aovs: Aovs | None = None) -> None:
+        """Take the pictures of a Frame; what is the same as before is not sent again.
+
+        When the size of a picture changes, the last complete one of the other size (the preview of a camera
+        move, say) shows through where the new one has no sample yet, until it is complete.
+        """
+        while len(self._sides) < len(pictures):
+            self._sides.append(_Side(self._context))
+        while len(self._sides) > len(pictures):
+            self._sides.pop(0).release()
+        for side, picture in zip(self._sides, pictures, strict=True):
+            side.upload(picture)
+        self._aovs = aovs
+
+    def forget(self) -> None:
+        """Drop the pictures: nothing of them may show through the next, of another scene."""
+        self.upload(())
+        self._aovs = None
+
+    @property
+    def has_picture(self) -> bool:
+        return bool(self._sides)
+
+    def overlay(self, side: int = -1) -> Overlay | None:
+        """The overlay of a side as it was drawn last, for its legend and numbers; see `overlays.Overlay`."""
+        return self._sides[side].overlay if self._sides else None
+
+    def draw(
+        self,
+        rect_px: Rect,
+        settings: DisplaySettings,
+        *,
+        framebuffer_size: tuple[int, int],
+        clip_px: Rect | None = None,
+        selection: Outlined | None = None,
+        scale: float = 1.0,
+    ) -> None:
+        """Draw into the framebuffer that is bound.
+
+        `rect_px` is where the image lies, (x, y, width, height) in pixels of the framebuffer from its top
+        left corner; it may reach beyond it. `clip_px`, by default the whole framebuffer, is where drawing is
+        allowed. `scale` is the DPI scale, for lines. Leaves viewport and blending as imgui's renderer, which
+        sets its own, may have them; restores the bound framebuffer.
+        """
+        area = inside(rect_px, clip_px, framebuffer_size)
+        if not self._sides or area is None:
+            return
+        context = self._context
+        target = context.fbo
+        context.enable_only(moderngl.NOTHING)
+        split = settings.split and len(self._sides) == 2
+        bar_x = split_x(rect_px, settings.split_position)
+        shown = [(self._sides[-1], area)]
+        if split:
+            x, y, width, height = area
+            cut = min(max(round(bar_x), x), x + width)
+            shown = [
+                (self._sides[0], (x, y, cut - x, height)),
+                (self._sides[1], (cut, y, x + width - cut, height)),
+            ]
+        for side, _ in shown:
+            self._map(side, settings)
+            side.lay_over(settings.overlay, self._aovs)
+        target.use()
+        context.scissor = None
+        for side, part in shown:
+            if part[2] > 0:
+                self._draw_side(side, part, rect_px, settings, framebuffer_size[1])
+        if settings.outline and selection is not None:
+            picture = self._sides[-1].picture
+            assert picture is not None
+            height, width = picture.image.shape[:2]
+            self._outline.draw(target, area, rect_px, framebuffer_size[1], selection, width / height, scale)
+        if split:
+            self._draw_bar(bar_x, area, rect_px, framebuffer_size[1], scale)
+        context.enable_only(moderngl.NOTHING)
+        context.viewport = (0, 0, *framebuffer_size)
+
+    def release(self) -> None:
+        """Give all GL objects back."""
+        self.forget()
+        self._outline.release()
+        for array in self._arrays.values():
+            array.release()
+        for program in self._programs:
+            program.release()
+
+    def _map(self, side: _Side, settings: DisplaySettings) -> None:
+        wanted = (settings.exposure, settings.curve)
+        if side.mapped_with == wanted:
+            return
+        assert side.radiance is not None and side.target is not None
+        program = self._tone_map
+        program["factor"] = 2.0**settings.exposure
+        program["curve"] = _SHADER_CURVES[settings.curve]
+        program["nothing"] = self.background
+        program["has_underlay"] = side.underlay is not None
+        program["picture"], program["underlay"] = 0, 1
+        side.radiance.use(0)
+        (side.underlay or side.radiance).use(1)
+        side.target.use()
+        self._context.scissor = None
+        self._arrays[program].render(moderngl.TRIANGLES, vertices=3)
+        side.mapped_with = wanted
+
+    def _draw_side(
+        self,
+        side: _Side,
+        part: tuple[int, int, int, int],
+        rect_px: Rect,
+        settings: DisplaySettings,
+        framebuffer_height: int,
+    ) -> None:
+        assert side.mapped is not None and side.picture is not None
+        width, height = side.mapped.size
+        grid_scale = (rect_px[2] / width, rect_px[3] / height)
+        magnified = min(grid_scale)
+        tile_size = side.picture.grid.tile_size
+        program = self._compose
+        program["rect"] = tuple(map(float, rect_px))
+        program["framebuffer_height"] = float(framebuffer_height)
+        program["nearest"] = magnified >= NEAREST_FROM
+        program["tile_size"] = float(tile_size)
+        program["grid_scale"] = grid_scale
+        program["grid_strength"] = _grid_strength(tile_size * magnified) if settings.tile_grid else 0.0
+        program["opacity"] = settings.overlay_opacity if side.overlay is not None else 0.0
+        program["overlay_extent"] = tuple(map(float, side.overlay.extent_px)) if side.overlay else (1.0, 1.0)
+        program["mapped"], program["overlay"] = 0, 1
+        side.mapped.use(0)
+        (side.overlay_texture or side.mapped).use(1)
+        self._context.viewport = viewport_of(part, framebuffer_height)
+        self._arrays[program].render(moderngl.TRIANGLES, vertices=3)
+
+    def _draw_bar(
+        self,
+        bar_x: float,
+        area: tuple[int, int, int, int],
+        rect_px: Rect,
+        framebuffer_height: int,
+        scale: float,
+    ) -> None:
+        grip = (GRIP_PX[0] / 2 * scale, GRIP_PX[1] / 2 * scale)
+        reach = math.ceil(grip[0] + 2 * scale)
+        x = round(bar_x)
+        part = inside((x - reach, area[1], 2 * reach, area[3]), area, None)
+        if part is None:
+            return
+        program = self._bar
+        program["center"] = (float(x), rect_px[1] + rect_px[3] / 2)
+        program["grip"] = grip
+        program["half_width"] = max(round(BAR_PX * scale), 1) / 2
+        program["rim"] = max(scale, 1.0)
+        program["framebuffer_height"] = float(framebuffer_height)
+        self._context.enable(moderngl.BLEND)
+        self._context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
+        self._context.viewport = viewport_of(part, framebuffer_height)
+        self._arrays[program].render(moderngl.TRIANGLES, vertices=3)
+
+
+def split_x(rect_px: Rect, position: float) -> float:
+    """Where the bar of the split view stands, x in pixels of the framebuffer."""
+    return rect_px[0] + rect_px[2] * position
+
+
+def _grid_strength(tile_px: float) -> float:
+    return 0.4 * min(max((tile_px - GRID_MIN_PX) / (GRID_FULL_PX - GRID_MIN_PX), 0.0), 1.0)
+
+
+def _is_complete(picture: Picture) -> bool:
+    return bool((picture.image[..., 3] != 0).all())
