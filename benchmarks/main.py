@@ -1,0 +1,40 @@
+"""`incpt bench`: measures incpt, and other renderers beside it. Each command is a module of this package."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+import typer
+
+from incpt.benchmarks import sweep
+from incpt.benchmarks.experiment import Stopped
+
+INTERRUPTED = 130
+
+app = typer.Typer(
+    name="incpt bench",
+    help="Measure incpt, and other renderers beside it. What is finished is never measured again.",
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+# A new command is a line here.
+app.command("sweep")(sweep.sweep)
+
+
+@app.callback()
+def _bench() -> None:
+    """Keeps the names of the commands also where there is one command only."""
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run a benchmark and return the exit status; raises what `incpt.cli` explains: InputError and others."""
+    try:
+        result = app(list(arguments), prog_name="incpt bench", standalone_mode=False)
+    except Stopped as stopped:
+        print(f"incpt: {stopped}", file=sys.stderr)
+        return INTERRUPTED
+    return result if isinstance(result, int) else 0

@@ -1,0 +1,227 @@
+"""`incpt bench sweep`: tile size, NoR, strategy and bounces over the edits of a script.
+
+After each edit the error at given steps and at given seconds, tiles and time per step, the time to the first
+updated tile and until the queue is done.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from incpt import scene_io
+from incpt.benchmarks import environment, experiment, options
+from incpt.benchmarks.content import digest
+from incpt.benchmarks.edits import EditBench, Marks, Timeline
+from incpt.benchmarks.experiment import Outcome, Task, Work
+from incpt.benchmarks.pictures import Gallery
+from incpt.benchmarks.store import Results, Store, grouped
+from incpt.benchmarks.tables import print_table
+from incpt.benchmarks.timing import interleaved, summary
+from incpt.device import Device
+from incpt.edit_script import Edit, EditScript, load_edits
+from incpt.errors import InputError
+from incpt.replay import Variant, variants
+from incpt.settings import STRATEGIES, RenderSettings
+
+NAME = "sweep"
+TILE_SIZES = (8, 16, 32, 64)
+NORS = (1, 16, 64, 128, 256, 512)
+STEPS = (1, 2, 5, 10, 30)
+SECONDS = (0.1, 0.3, 1.0, 3.0, 10.0)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Everything that is varied, and how it is measured."""
+
+    tile_sizes: Sequence[int] = TILE_SIZES
+    variants: Sequence[Variant] = tuple(variants(STRATEGIES, NORS))
+    bounces: Sequence[int] = (3,)
+    marks: Marks = Marks(STEPS, SECONDS, done=True)
+    repetitions: int = 3
+    base_spp: int = 1024
+    reference_spp: int = 4096
+
+
+@dataclass(frozen=True)
+class Case:
+    """One edit under one strategy with one set of settings."""
+
+    edit: Edit
+    variant: Variant
+    settings: RenderSettings
+
+    @property
+    def label(self) -> str:
+        """For people."""
+        tile, bounces = self.settings.tile_size, self.settings.max_bounces
+        return f"{self.edit.label}: tile {tile}, {bounces} bounces, {self.variant.label}"
+
+
+def cases(script: EditScript, settings: RenderSettings, grid: Grid) -> list[Case]:
+    """All combinations; those that are compared with each other come next to each other."""
+    return [
+        Case(
+            edit,
+            variant,
+            replace(
+                settings, tile_size=tile, max_bounces=bounces, strategy=variant.strategy, nor=variant.nor
+            ),
+        )
+        for bounces, edit, tile, variant in itertools.product(
+            grid.bounces, script.edits, grid.tile_sizes, grid.variants
+        )
+    ]
+
+
+def tasks(bench: EditBench, script: EditScript, settings: RenderSettings, grid: Grid) -> list[Task]:
+    """A task for each repetition of each case; the variants of a setting take turns."""
+    every = cases(script, settings, grid)
+    step = len(grid.variants)
+    groups = [every[i : i + step] for i in range(0, len(every), step)]
+    return [
+        _task(bench, case, grid, repetition)
+        for group in groups
+        for repetition, case in interleaved(group, grid.repetitions)
+    ]
+
+
+def _task(bench: EditBench, case: Case, grid: Grid, repetition: int) -> Task:
+    # Only once to the end of the queue: with NoR 512 that takes as long as 512 pictures.
+    marks = replace(grid.marks, done=grid.marks.done and repetition == 0)
+    settings = case.settings
+    subject = {
+        "scene": digest(bench.scene),
+        "edit": case.edit.label,
+        "edited": digest(case.edit.apply(bench.scene), case.edit.pixel),
+        "tile_size": settings.tile_size,
+        "strategy": case.variant.strategy,
+        # Restarting does not use it.
+        "nor": None if case.variant.strategy == "restart" else case.variant.nor,
+        **{n: getattr(settings, n) for n in RenderSettings.names() if n not in _VARIED},
+        "base_spp": grid.base_spp,
+        "reference_spp": grid.reference_spp,
+        "marks": [*marks.steps, *(f"{s:g} s" for s in marks.seconds), *(["done"] if marks.done else [])],
+        "repetition": repetition,
+    }
+    subject["size"] = list(settings.size)
+
+    def measure(work: Work) -> Outcome:
+        def note(fraction: float) -> None:
+            work.check(fraction)
+            if fraction == 0.5:
+                work.timing_starts()
+
+        line: Timeline = bench.run(case.edit, settings, marks, note)
+        return Outcome(line.values(), [capture.as_row() for capture in line.captures])
+
+    weight = max((*marks.steps, 1)) + 4 * max((*marks.seconds, 0.0))
+    return Task(case.label, subject, measure, weight + (case.variant.nor if marks.done else 0))
+
+
+_VARIED = ("size", "tile_size", "strategy", "nor")
+
+
+def table(results: Results) -> Table:
+    """Medians over the repetitions; below steps and seconds the normalized RMSE."""
+    shown = Table(title="sweep: medians", title_justify="left", box=None, pad_edge=False)
+    marks = sorted({row["mark"] for r in results.records for row in r.rows}, key=_mark_order)
+    for name in ("edit", "strategy", "NoR", "tile", "bounces", "first tile ms", "step ms", "queue s", *marks):
+        shown.add_column(name, justify="left" if name in ("edit", "strategy") else "right", no_wrap=True)
+    names = ("edit", "strategy", "nor", "tile_size", "max_bounces")
+    timings = [
+        grouped(results, lambda r, v=value: r.values.get(v), *names)  # type: ignore[misc]
+        for value in ("first_tile_ms", "step_ms", "queue_s")
+    ]
+    at_marks = [grouped(results, lambda r, m=mark: error_at(r.rows, m), *names) for mark in marks]  # type: ignore[misc]
+    for case in timings[1]:
+        cells = ["" if name is None else str(name) for name in case]
+        cells += [_median(timing.get(case)) for timing in timings]
+        shown.add_row(*cells, *(_error(errors.get(case)) for errors in at_marks))
+    return shown
+
+
+def error_at(rows: Sequence[Mapping[str, Any]], mark: str) -> float | None:
+    """The normalized RMSE at a mark, where there is one."""
+    return next((float(row["normalized_rmse"]) for row in rows if row["mark"] == mark), None)
+
+
+def _mark_order(mark: str) -> tuple[int, float]:
+    number, _, unit = mark.partition(" ")
+    return (2, 0.0) if mark == "done" else (int(unit == "s"), float(number))
+
+
+def _median(values: Sequence[float] | None) -> str:
+    return summary(values).text() if values else ""
+
+
+def _error(values: Sequence[float] | None) -> str:
+    return f"{summary(values).median:.4f}" if values else ""
+
+
+def sweep(
+    scene_file: Annotated[Path, typer.Argument(help="Scene file (.toml).", show_default=False)],
+    edits_file: Annotated[Path, typer.Argument(help="Edit script (.toml).", show_default=False)],
+    output: options.OutputOption = options.DEFAULT_FOLDER,
+    tile: Annotated[list[int] | None, typer.Option(help="Tile size; may be repeated.")] = None,
+    nor: Annotated[list[int] | None, typer.Option(help="NoR; may be repeated.")] = None,
+    strategy: Annotated[list[str] | None, typer.Option(help="Strategy; may be repeated.")] = None,
+    max_bounces: Annotated[
+        list[int] | None, typer.Option("--max-bounces", help="May be repeated [default: the scene's].")
+    ] = None,
+    at_step: Annotated[list[int] | None, typer.Option(help="Compare after so many steps.")] = None,
+    at_second: Annotated[list[float] | None, typer.Option(help="Compare after so many seconds.")] = None,
+    base_spp: Annotated[int | None, typer.Option(help="Samples per pixel before the edits.", min=1)] = None,
+    reference_spp: Annotated[int | None, typer.Option(help="Samples to compare with.", min=1)] = None,
+    size: options.SizeOption = None,
+    repetitions: options.RepetitionsOption = None,
+    quick: options.QuickOption = False,
+    device: options.DeviceOption = None,
+) -> None:
+    """Tile size x NoR x strategy x bounces: error at steps and seconds, and times, after each edit."""
+    scene = scene_io.load(scene_file)
+    script = load_edits(edits_file, scene)
+    if script.cumulative:
+        script = EditScript(script.edits, cumulative=False)  # each edit starts from the same picture
+    for edit in script.edits:
+        edit.apply(scene)
+    settings = replace(
+        scene.settings, size=options.parse_size(size, (320, 180) if quick else scene.settings.size)
+    )
+    grid = Grid(
+        options.counts("--tile", tile, (16, 64) if quick else TILE_SIZES),
+        variants(
+            options.chosen("--strategy", strategy, STRATEGIES),
+            options.counts("--nor", nor, (16, 256) if quick else NORS),
+        ),
+        options.counts("--max-bounces", max_bounces, (scene.settings.max_bounces,), least=0),
+        Marks(
+            tuple(options.counts("--at-step", at_step, STEPS, least=0)),
+            _seconds(at_second, SECONDS[:3] if quick else SECONDS),
+            done=True,
+        ),
+        repetitions or (1 if quick else 3),
+        base_spp or (128 if quick else 1024),
+        reference_spp or (512 if quick else 4096),
+    )
+    cases(script, settings, grid)  # says which number is out of range before anything is rendered
+    opened = Device(device)
+    store = Store(output, NAME)
+    gallery = Gallery(output / "references", opened)
+    bench = EditBench(opened, gallery, scene, grid.base_spp, grid.reference_spp)
+    found = experiment.run(store, tasks(bench, script, settings, grid), environment.describe(opened))
+    print_table(table(found), found, store)
+
+
+def _seconds(given: Sequence[float] | None, default: Sequence[float]) -> tuple[float, ...]:
+    for number in given or ():
+        if not 0 < number < 1e6:
+            raise InputError(f"--at-second: {number:g} is out of range; use a positive number of seconds")
+    return tuple(sorted(set(given))) if given else tuple(default)
