@@ -26,10 +26,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from incpt import device as opencl
-from incpt import image_io, scene_io
+from incpt import scene_io
 from incpt.console import interruption, path_progress
 from incpt.edit_script import load_edits
 from incpt.errors import DeviceError, InputError, InputWarning, OutputError, one_line
+from incpt.export import SUFFIXES, write_picture
 from incpt.replay import Replay, variants
 from incpt.replay_report import ReplayReport
 from incpt.scene import Scene
@@ -39,7 +40,6 @@ from incpt.tiles import TileGrid
 
 INTERRUPTED = 130
 """Exit status of a command that Ctrl-C stopped: 128 + SIGINT, as shells have it."""
-PICTURE_SUFFIXES = (".exr", ".png")
 
 app = typer.Typer(
     name="incpt",
@@ -136,6 +136,7 @@ def _root(
 
 # ------------------------------------------------------------------------------------------ commands
 
+_EXTRAS = {"ui": "ui", "benchmarks": "bench"}
 _PASS_ON = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
 
 
@@ -159,7 +160,7 @@ def _enter(module_name: str, what: str, arguments: list[str]) -> int:
         missing = error.name or module_name
         if module_name.startswith(missing):
             return _complain(f"{what}: not in this version; it comes with a later one", 1)
-        extra = module_name.split(".")[1]
+        extra = _EXTRAS[module_name.split(".")[1]]
         return _complain(f'{what}: {missing} is not installed; run pip install "incpt[{extra}]"', 1)
     return int(module.main(arguments))
 
@@ -203,7 +204,7 @@ def render(
             if not stop.requested:
                 raise
         # Still inside, so that another Ctrl-C does not tear the picture that is kept.
-        _write_picture(output, session, aovs)
+        write_picture(output, session, aovs)
     samples = int(session.spp().min())
     if nonfinite:
         _complain(f"warning: {nonfinite:,} samples were not finite and count as black", 0)
@@ -336,7 +337,7 @@ def _parse_size(text: str) -> tuple[int, int]:
 
 def _check_picture_path(path: Path) -> None:
     """Before the long work: a suffix that names a format, and a place that can be written."""
-    if path.suffix.lower() not in PICTURE_SUFFIXES:
+    if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"-o {path}: ends in no known format; use .exr or .png")
     if path.is_dir():
         raise OutputError(f"{path}: is a folder; name a file in it")
@@ -348,16 +349,3 @@ def _check_folder(folder: Path) -> None:
         raise OutputError(f"{folder}: no such folder; make it first")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise OutputError(f"{folder}: cannot be written; choose another folder")
-
-
-def _write_picture(path: Path, session: Session, with_aovs: bool) -> None:
-    if path.suffix.lower() == ".png":
-        image_io.write_png(path, session.image())
-        return
-    layers: dict[str, Any] = {"RGB": session.image()}
-    if with_aovs:
-        aovs = session.aovs()
-        # Object ids are unsigned in OpenEXR; the largest one stands for "none".
-        layers |= {"albedo.RGB": aovs.albedo, "normal.XYZ": aovs.normal, "depth.Z": aovs.depth}
-        layers["object_id"] = aovs.object_id.view("uint32")
-    image_io.write_exr(path, layers)

@@ -27,6 +27,11 @@ _BUILD_OPTIONS = ["-cl-std=CL1.2", "-cl-mad-enable", "-cl-no-signed-zeros"]
 _INCLUDE = re.compile(r'^#include "(\w+)\.cl"$', re.MULTILINE)
 
 
+BUILD_SIZES = (1, 1 << 17)
+"""Work-items of the launches after which a kernel is built to the end: PoCL translates one to machine code
+at its first launch, once for small grids and once for large ones."""
+
+
 @dataclass(frozen=True)
 class Tuning:
     """What suits a kind of device. `chunk_paths`: paths traced at a time, so that their state stays in
@@ -60,6 +65,8 @@ class Device:
                 f"device {self.name!r} cannot be opened: {error}; try another --device"
             ) from error
         self._kernels: dict[tuple[str, tuple[str, ...]], cl.Kernel] = {}
+        self.built: set[tuple[str, ...]] = set()
+        """The variants of the kernels that were built as a whole; see `DeviceScene.variant`."""
 
     @property
     def name(self) -> str:

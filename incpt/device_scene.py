@@ -55,6 +55,11 @@ class DeviceScene:
         return change
 
     @property
+    def variant(self) -> tuple[str, ...]:
+        """What chooses the variants of all kernels that this scene needs."""
+        return (*self.features, *(("MEDIA",) if self.has_media else ()))
+
+    @property
     def geometry(self) -> tuple[cl.Buffer, ...]:
         """What traversal reads: top nodes, nodes, packs, objects, materials."""
         return tuple(self._buffers[n] for n in ("top_nodes", "nodes", "packs", "objects", "materials"))

@@ -6,12 +6,16 @@ the film has of it or is added; one that is under way waits in `pending`, so tha
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
 from incpt import layout
-from incpt.device import Device
+from incpt.device import BUILD_SIZES, Device
 from incpt.tiles import Plan, TileGrid
 
 _PLANES = 4  # red, green, blue, samples
@@ -33,9 +37,9 @@ class Film:
         """Put the paths of a step, `radiance` in the order of its `slots`, into the film."""
         groups = np.unique(plan.slots["group_first"]).astype(np.uint32)
         size = len(groups) * int(params["tile_size"]) ** 2
-        self.device.launch(
-            self.device.kernel("reduce"), size, params, np.uint32(len(groups)), self.device.upload(groups),
-            slots, radiance, self._pending, self._sums, self._nonfinite,
+        self._launch(
+            "reduce", size, params, np.uint32(len(groups)), self.device.upload(groups), slots, radiance,
+            self._pending, self._sums, self._nonfinite,
         )  # fmt: skip
 
     def take_nonfinite(self) -> int:
@@ -45,10 +49,24 @@ class Film:
             self.device.fill(self._nonfinite, 0, 4)
         return count
 
+    def _launch(self, name: str, size: int, *args: Any) -> None:
+        self.device.launch(self.device.kernel(name), size, *args)
+
+    def idle_launches(self, params: npt.NDArray[np.void], radiance: cl.Buffer) -> list[Callable[[], None]]:
+        """The launches of the film's kernels, each with nothing to do; see `Device.built`."""
+        nothing, none = np.uint32(0), self._nonfinite
+        arguments = {
+            "reduce": (params, nothing, none, none, radiance, self._pending, self._sums, none),
+            "resolve": (nothing, self._sums, self._image),
+        }
+        return [
+            partial(self._launch, name, size, *arguments[name]) for name in arguments for size in BUILD_SIZES
+        ]
+
     def image(self) -> npt.NDArray[np.float32]:
         """(height, width, 4) mean radiance, linear; alpha is 0 where there is no sample yet."""
         pixels = self.width * self.height
-        self.device.launch(self.device.kernel("resolve"), pixels, np.uint32(pixels), self._sums, self._image)
+        self._launch("resolve", pixels, np.uint32(pixels), self._sums, self._image)
         return self.device.read(self._image, np.empty((self.height, self.width, _PLANES), np.float32))
 
     def sums(self) -> npt.NDArray[np.float32]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,15 +18,15 @@ import numpy.typing as npt
 from incpt import layout, tiles, transform
 from incpt.device import Device
 from incpt.device_scene import DeviceScene
-from incpt.errors import InputError
+from incpt.errors import DeviceError, InputError
 from incpt.film import Film, path_buffer_stride, tile_image
 from incpt.modes import Event, Mode, next_mode
-from incpt.scene import Change, Object, Scene
+from incpt.scene import Change, Object, Scene, diff
 from incpt.settings import RenderSettings
 from incpt.wavefront import Wavefront
 
 # Settings that change what a sample is worth, so that what was accumulated cannot be kept.
-_PICTURE_SETTINGS = ("max_bounces", "transmission_bounces", "roulette_depth", "seed")
+PICTURE_SETTINGS = ("max_bounces", "transmission_bounces", "roulette_depth", "seed")
 
 # Kernels index the three planes of the path buffer with 32 bits.
 _MOST_PATH_FLOATS = 1 << 32
@@ -92,6 +92,7 @@ class Session:
         self._wavefront = Wavefront(self.device)
         self._device_scene = DeviceScene(self.device, scene)
         self._cursor = tiles.Cursor()
+        self._buffer_stride = 0
         self._start_film()
 
     @property
@@ -121,16 +122,23 @@ class Session:
         """How far the queue is done."""
         return self._cursor
 
-    def step(self) -> StepReport:
-        """Render one step: as many slots as the settings allow, at most to the end of the queue."""
+    @property
+    def tile_spp(self) -> npt.NDArray[np.int64]:
+        """(count,) samples behind each tile; 0 where the old picture waits to be thrown away."""
+        return self._tile_spp
+
+    def step(self, slots: int | None = None) -> StepReport:
+        """Render one step, at most to the end of the queue: `slots` of tile_size^2 paths each (fewer where
+        memory does not suffice), or as many as the settings say."""
         start = time.perf_counter()
         mode, queue = self._mode, self._queue
-        plan = tiles.plan(self._grid, queue, self._cursor, self._slot_count(), self._tile_spp)
+        slot_count = self._slot_count() if slots is None else self._reserve_slots(slots)
+        plan = tiles.plan(self._grid, queue, self._cursor, slot_count, self._tile_spp)
         params = self._params()
-        slots = self.device.upload(plan.slots)
+        filled = self.device.upload(plan.slots)
         paths = len(plan.slots) * self.settings.tile_size**2
-        self._wavefront.trace(self._device_scene, params, slots, paths, self._radiance)
-        self._film.reduce(params, plan, slots, self._radiance)
+        self._wavefront.trace(self._device_scene, params, filled, paths, self._radiance)
+        self._film.reduce(params, plan, filled, self._radiance)
         nonfinite = self._film.take_nonfinite()
         if queue.replaces:
             self._tile_spp[plan.finished] = queue.samples
@@ -149,32 +157,58 @@ class Session:
             nonfinite,
         )
 
-    def edit(self, scene: Scene, pixel: tuple[float, float] | None = None) -> Change:
+    def edit(
+        self,
+        scene: Scene,
+        pixel: tuple[float, float] | None = None,
+        since: Scene | None = None,
+        settings: RenderSettings | None = None,
+    ) -> Change:
         """Go on with another scene; returns what differs. `pixel` is the point of change where the settings
-        ask for it, as (x, y) from the top left. On an error the old scene and the picture stay."""
+        ask for it, as (x, y) from the top left. `settings` are those from now on, as for `configure`. On an
+        error the old scene and the picture stay.
+
+        `since` is the scene before a drag of which this edit is one step: the point of change then takes
+        in where the object was before the drag. At the end of the drag, the same scene handed in again with
+        `since` starts the spiral anew, with the NoR that the settings have then.
+        """
         old = self.scene
-        change = self._device_scene.update(scene)
-        affected = affected_objects(old, scene, change)
+        with self._unchanged_on_error():
+            if settings is not None:
+                self.configure(settings)
+            # Last, since the scene on the device is not put back here.
+            change = self._device_scene.update(scene)
+        changed = affected_objects(old, scene, change)
+        affected = changed
+        if since is not None and not (drag := diff(since, scene)).is_global:
+            affected = affected_objects(since, scene, drag) or changed
+        mode = next_mode(self._mode, Event.LOCAL_CHANGE, self.settings.strategy)
         if change.is_global:
             self._enter(next_mode(self._mode, Event.GLOBAL_CHANGE, self.settings.strategy))
-        elif affected:
+        elif changed or (affected and mode is Mode.INCREMENTAL):
             point = pixel if pixel is not None and self.settings.point_of_change == "pixel" else None
-            point = self._point_of_change(affected) if point is None else point
-            self._enter(next_mode(self._mode, Event.LOCAL_CHANGE, self.settings.strategy), point)
+            self._enter(mode, self._point_of_change(affected) if point is None else point)
         return change
+
+    def restart(self) -> None:
+        """Throw away what was accumulated; the picture stands until it is rendered anew."""
+        self._enter(Mode.BASE)
 
     def configure(self, settings: RenderSettings) -> None:
         """Render with other settings from now on. The picture starts over only if samples change meaning.
         On an error the old settings and the picture stay."""
         with self._unchanged_on_error():
-            old, self.settings = self.settings, settings
+            old, old_stride = self.settings, self._stride_of_settings()
+            self.settings = settings
             if (old.size, old.tile_size) != (settings.size, settings.tile_size):
                 self._start_film()
-            elif any(getattr(old, name) != getattr(settings, name) for name in _PICTURE_SETTINGS):
+            elif any(getattr(old, name) != getattr(settings, name) for name in PICTURE_SETTINGS):
                 self._enter(Mode.BASE)
-            elif self._mode is not Mode.INCREMENTAL and self._cursor == tiles.Cursor():
-                self._enter(self._mode)
-            self._resize_path_buffer()
+            elif self._cursor == tiles.Cursor():
+                self._enter(self._mode, order=self._queue.tiles)
+            stride = self._stride_of_settings()
+            if stride > self._buffer_stride or stride < old_stride:
+                self._resize_path_buffer(stride)
 
     def render(self, spp: int, on_step: Callable[[StepReport], None] | None = None) -> None:
         """Step until every pixel shows the scene as it is now with at least `spp` samples."""
@@ -208,24 +242,26 @@ class Session:
             # Last, since the scene on the device is not put back here.
             self._device_scene.update(snapshot.scene)
 
-    def image(self) -> npt.NDArray[np.float32]:
+    def image(self, alpha: bool = False) -> npt.NDArray[np.float32]:
         """(H, W, 3) mean radiance, linear; row 0 is on top. What is not rendered anew yet shows the old
-        picture, at first black."""
-        return np.ascontiguousarray(self._film.image()[..., :3])
+        picture, at first black. With `alpha` (H, W, 4): 0 where there was never a picture of this size."""
+        image = self._film.image()
+        return image if alpha else np.ascontiguousarray(image[..., :3])
 
     def spp(self) -> npt.NDArray[np.int64]:
         """(H, W) samples behind each pixel; 0 where the old picture waits to be thrown away."""
         return tile_image(self._grid, self._tile_spp)
 
-    def aovs(self) -> Aovs:
-        """Auxiliary images of the scene as it is now; see Aovs."""
-        width, height = self.size
-        tile_count = self._grid.count
-        queue = tiles.Queue(tiles.base_queue(self._grid), 1, True)
-        surface, object_ids = self._first_hits(
-            tiles.plan(self._grid, queue, tiles.Cursor(), tile_count, self._tile_spp).slots,
-            self._params(),
-        )
+    def aovs(self, size: tuple[int, int] | None = None) -> Aovs:
+        """Auxiliary images of the scene as it is now, of the session's size or another; see Aovs."""
+        width, height = self.size if size is None else size
+        params = self._params((width, height))
+        # Tiles of any size serve; these keep neighbouring rays together.
+        params["tile_size"] = RenderSettings.tile_size
+        grid = tiles.TileGrid(width, height, RenderSettings.tile_size)
+        queue = tiles.Queue(tiles.base_queue(grid), 1, True)
+        plan = tiles.plan(grid, queue, tiles.Cursor(), grid.count, np.zeros(grid.count, np.int64))
+        surface, object_ids = self._first_hits(plan.slots, params)
         surface = surface.reshape(7, height, width)
         return Aovs(
             object_ids.reshape(height, width),
@@ -241,18 +277,42 @@ class Session:
         width, height = self.size
         if not (0 <= x < width and 0 <= y < height):
             raise InputError(f"pixel ({x}, {y}): is outside the image of {width} x {height}")
-        slot = np.zeros(1, layout.SLOT)
-        slot["tile_x"], slot["tile_y"], slot["group_count"] = x, y, 1
+        return self.pick_point(((x + 0.5) / width, (y + 0.5) / height))
+
+    def pick_point(self, point: tuple[float, float]) -> str | None:
+        """The name of the object at a point (x, y) from the top left, in units of the image, or None."""
         params = self._params()
-        params["tile_size"] = 1
-        _, object_ids = self._first_hits(slot, params)
-        index = int(object_ids[y * width + x])
+        camera = params["camera"]
+        # An image of one pixel, whose centre is the point.
+        camera["forward"] += (2 * point[0] - 1) * camera["right"] + (1 - 2 * point[1]) * camera["up"]
+        params["width"] = params["height"] = params["tile_size"] = 1
+        _, object_ids = self._first_hits(_one_slot(), params)
+        index = int(object_ids[0])
         return self.scene.objects[index].name if index >= 0 else None
+
+    def build(self, on_progress: Callable[[int, int], None] | None = None) -> None:
+        """Build every kernel that the scene as it is now needs, so that no later call has to wait for one.
+        `on_progress` is called with how many of how many steps are done; not at all if nothing is to do.
+        What it raises ends the building, which may go on later."""
+        kernels = self._device_scene.variant
+        if kernels in self.device.built:
+            return
+        params, slots = self._params(), self.device.upload(_one_slot())
+        steps = [
+            *self._wavefront.idle_launches(self._device_scene, params, slots, self._radiance),
+            *self._film.idle_launches(params, self._radiance),
+        ]
+        for done, step in enumerate(steps, 1):
+            step()
+            self.device.finish()
+            if on_progress is not None:
+                on_progress(done, len(steps))
+        self.device.built.add(kernels)
 
     def _first_hits(
         self, slots: npt.NDArray[np.void], params: npt.NDArray[np.void]
     ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]:
-        pixels = self.size[0] * self.size[1]
+        pixels = int(params["width"]) * int(params["height"])
         paths = len(slots) * int(params["tile_size"]) ** 2
         params["pixel_center"] = 1
         params["buffer_stride"] = paths + layout.WORK_GROUP_SIZE
@@ -281,15 +341,16 @@ class Session:
         self._grid = tiles.TileGrid(width, height, self.settings.tile_size)
         self._film = Film(self.device, width, height)
         self._tile_spp = np.zeros(self._grid.count, np.int64)
-        self._buffer_stride = 0
-        self._resize_path_buffer()
+        stride = self._stride_of_settings()
+        if stride > self._buffer_stride:
+            self._resize_path_buffer(stride)
         self._enter(Mode.BASE)
 
     def _slot_count(self) -> int:
         slots = self.settings.slots_per_step or self._grid.count
         return slots * self.settings.sample_rate
 
-    def _resize_path_buffer(self) -> None:
+    def _stride_of_settings(self) -> int:
         stride = path_buffer_stride(self._slot_count(), self.settings.tile_size)
         if 3 * stride > _MOST_PATH_FLOATS:
             most = (_MOST_PATH_FLOATS // 3 - layout.WORK_GROUP_SIZE) // self.settings.tile_size**2
@@ -297,18 +358,38 @@ class Session:
                 f"sample_rate: a step of {self._slot_count():,} slots is more than the {most:,} that can be "
                 f"addressed; choose a smaller sample_rate or slots_per_step"
             )
+        return stride
+
+    def _resize_path_buffer(self, stride: int) -> None:
         if stride != self._buffer_stride:
             self._radiance = self.device.empty(12 * stride)
             self._buffer_stride = stride
 
-    def _enter(self, mode: Mode, point_px: tuple[float, float] | None = None) -> None:
+    def _reserve_slots(self, slots: int) -> int:
+        """Make room for so many slots; returns for how many there is, one at least."""
+        area = self.settings.tile_size**2
+        slots = max(1, min(slots, (_MOST_PATH_FLOATS // 3 - layout.WORK_GROUP_SIZE) // area))
+        stride = path_buffer_stride(slots, self.settings.tile_size)
+        if stride > self._buffer_stride:
+            # Room to spare, since callers come back for a little more each time.
+            with suppress(DeviceError):
+                self._resize_path_buffer(min(2 * stride, _MOST_PATH_FLOATS // 3))
+        return min(slots, (self._buffer_stride - layout.WORK_GROUP_SIZE) // area)
+
+    def _enter(
+        self,
+        mode: Mode,
+        point_px: tuple[float, float] | None = None,
+        order: npt.NDArray[np.int32] | None = None,
+    ) -> None:
         self._mode = mode
         self._cursor = tiles.Cursor()
         incremental = mode is Mode.INCREMENTAL
-        if incremental and point_px is not None:
-            order = tiles.spiral_queue(self._grid, point_px)
-        else:
-            order = tiles.base_queue(self._grid)
+        if order is None:
+            if incremental and point_px is not None:
+                order = tiles.spiral_queue(self._grid, point_px)
+            else:
+                order = tiles.base_queue(self._grid)
         if mode is Mode.BASE:
             self._tile_spp = np.zeros_like(self._tile_spp)
         repetitions = self.settings.nor if incremental else self.settings.base_nor
@@ -332,8 +413,8 @@ class Session:
         x, y = (low + high) / 2
         return float(x), float(y)
 
-    def _params(self) -> npt.NDArray[np.void]:
-        width, height = self.size
+    def _params(self, size: tuple[int, int] | None = None) -> npt.NDArray[np.void]:
+        width, height = self.size if size is None else size
         scene, settings = self.scene, self.settings
         camera = scene.camera
         params = np.zeros((), layout.PARAMS)
@@ -354,6 +435,13 @@ class Session:
             params["environment_height"], params["environment_width"] = shape[:2]
         params["environment_rotation"] = scene.environment.rotation_y / 360 % 1
         return params
+
+
+def _one_slot() -> npt.NDArray[np.void]:
+    """A single path per pixel of the tile at the top left."""
+    slot = np.zeros(1, layout.SLOT)
+    slot["group_count"] = 1
+    return slot
 
 
 def affected_objects(old: Scene, new: Scene, change: Change) -> list[Object]:

@@ -9,6 +9,8 @@ in SIMD lanes. Paths are traced in chunks whose state fits the caches of a CPU.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +18,7 @@ import numpy.typing as npt
 import pyopencl as cl
 
 from incpt import layout
-from incpt.device import Device
+from incpt.device import BUILD_SIZES, Device
 from incpt.device_scene import DeviceScene
 
 _MOST_LISTS = 3
@@ -44,6 +46,7 @@ class Wavefront:
             device.empty(4 * self.stride) for _ in range(6)
         )
         self._counters = device.empty(4 * _MOST_LISTS)
+        self._least_size = 1
 
     def trace(
         self,
@@ -57,9 +60,7 @@ class Wavefront:
         planes of params["buffer_stride"] floats."""
         for first in range(0, path_count, self.chunk_paths):
             chunk = self._chunk_params(params, first, path_count)
-            size = int(chunk["path_count"])
-            self._launch("generate", size, chunk, slots, self._rays, self._paths, radiance)
-            count = self._compact(chunk, size, None, (_Class.LIVE, self._live))[0]
+            count = self._generate(chunk, slots, radiance)
             for ray in range(_MOST_RAYS):
                 if count == 0:
                     break
@@ -79,14 +80,44 @@ class Wavefront:
         pixels = np.uint32(int(params["width"]) * int(params["height"]))
         for first in range(0, path_count, self.chunk_paths):
             chunk = self._chunk_params(params, first, path_count)
-            size = int(chunk["path_count"])
-            self._launch("generate", size, chunk, slots, self._rays, self._paths, radiance)
-            count = self._compact(chunk, size, None, (_Class.LIVE, self._live))[0]
+            count = self._generate(chunk, slots, radiance)
             self._intersect(scene, chunk, count)
-            self._launch(
-                "aov", size, chunk, pixels, scene.buffer("materials"), self._hits, self._paths, surface,
-                object_ids,
-            )  # fmt: skip
+            self._describe(scene, chunk, pixels, surface, object_ids)
+
+    def idle_launches(
+        self, scene: DeviceScene, params: npt.NDArray[np.void], slots: cl.Buffer, radiance: cl.Buffer
+    ) -> list[Callable[[], None]]:
+        """A launch of every kernel that `trace` and `first_hits` may need for this scene, each with nothing
+        to do; see `Device.built`. `slots` holds one slot, which lanes without a path read."""
+        chunk = self._chunk_params(params, 0, 0)
+        nothing = self._counters
+        stages: list[Callable[[], object]] = [
+            partial(self._generate, chunk, slots, radiance),
+            partial(self._intersect, scene, chunk, 0),
+            partial(self._illuminate, scene, chunk, 0, self._surfaces),
+            partial(self._shade, scene, chunk, 0, radiance),
+            partial(self._occlude, scene, chunk, 0, radiance),
+            partial(self._describe, scene, chunk, np.uint32(0), nothing, nothing),
+            partial(self._escape, scene, chunk, 0, radiance),
+        ]
+        if scene.has_media:
+            stages.append(partial(self._shade_media, scene, chunk, 0, radiance))
+        else:
+            stages.append(partial(self._shade, scene, chunk, 0, radiance, last=True))
+        return [partial(self._launch_idle, stage, size) for stage in stages for size in BUILD_SIZES]
+
+    def _launch_idle(self, stage: Callable[[], object], size: int) -> None:
+        self._least_size = size
+        try:
+            stage()
+        finally:
+            self._least_size = 1
+
+    def _generate(self, params: npt.NDArray[np.void], slots: cl.Buffer, radiance: cl.Buffer) -> int:
+        """Start the paths of a chunk; returns how many lie in the image."""
+        size = int(params["path_count"])
+        self._launch("generate", size, params, slots, self._rays, self._paths, radiance)
+        return self._compact(params, size, None, (_Class.LIVE, self._live))[0]
 
     def _chunk_params(
         self, params: npt.NDArray[np.void], first: int, path_count: int
@@ -111,12 +142,7 @@ class Wavefront:
             (_Class.MEDIUM, self._media),
         )
         if escaped_count and any(scene.environment_radiance):
-            self._launch(
-                "escape", escaped_count, params, np.uint32(escaped_count), self._escaped,
-                scene.buffer("materials"), scene.buffer("environment_image"), scene.buffer("texel_pdf"),
-                self._rays, self._paths, radiance,
-                features=(*scene.features, *(("MEDIA",) if scene.has_media else ())),
-            )  # fmt: skip
+            self._escape(scene, params, escaped_count, radiance)
         # Without media every ray is a scattering event, so that all paths end with the same one.
         last = not scene.has_media and ray > int(params["max_bounces"])
         if surface_count and not last:
@@ -125,19 +151,12 @@ class Wavefront:
             self._illuminate(scene, params, medium_count, self._media)
             surface_count = self._shade_media(scene, params, medium_count, radiance)
         if surface_count:
-            self._launch(
-                "shade", surface_count, params, np.uint32(surface_count), self._surfaces,
-                scene.buffer("materials"), scene.buffer("layers"), *self._state, radiance,
-                features=("EMISSION_ONLY",) if last else scene.features,
-            )  # fmt: skip
+            self._shade(scene, params, surface_count, radiance, last)
         next_count, shadow_count, _ = self._compact(
             params, count, self._live, (_Class.LIVE, self._next), (_Class.SHADOW, self._shadowed)
         )
         if shadow_count:
-            self._launch(
-                "occlude", shadow_count, params, np.uint32(shadow_count), self._shadowed, *scene.geometry[:4],
-                self._shadows, radiance,
-            )  # fmt: skip
+            self._occlude(scene, params, shadow_count, radiance)
         self._live, self._next = self._next, self._live
         return next_count
 
@@ -145,6 +164,50 @@ class Wavefront:
         self._launch(
             "intersect", count, params, np.uint32(count), self._live, *scene.geometry,
             scene.buffer("normals"), self._rays, self._paths, self._hits,
+        )  # fmt: skip
+
+    def _escape(
+        self, scene: DeviceScene, params: npt.NDArray[np.void], count: int, radiance: cl.Buffer
+    ) -> None:
+        self._launch(
+            "escape", count, params, np.uint32(count), self._escaped, scene.buffer("materials"),
+            scene.buffer("environment_image"), scene.buffer("texel_pdf"), self._rays, self._paths, radiance,
+            features=scene.variant,
+        )  # fmt: skip
+
+    def _shade(
+        self,
+        scene: DeviceScene,
+        params: npt.NDArray[np.void],
+        count: int,
+        radiance: cl.Buffer,
+        last: bool = False,
+    ) -> None:
+        self._launch(
+            "shade", count, params, np.uint32(count), self._surfaces, scene.buffer("materials"),
+            scene.buffer("layers"), *self._state, radiance,
+            features=("EMISSION_ONLY",) if last else scene.features,
+        )  # fmt: skip
+
+    def _occlude(
+        self, scene: DeviceScene, params: npt.NDArray[np.void], count: int, radiance: cl.Buffer
+    ) -> None:
+        self._launch(
+            "occlude", count, params, np.uint32(count), self._shadowed, *scene.geometry[:4], self._shadows,
+            radiance,
+        )  # fmt: skip
+
+    def _describe(
+        self,
+        scene: DeviceScene,
+        params: npt.NDArray[np.void],
+        pixels: np.uint32,
+        surface: cl.Buffer,
+        object_ids: cl.Buffer,
+    ) -> None:
+        self._launch(
+            "aov", int(params["path_count"]), params, pixels, scene.buffer("materials"), self._hits,
+            self._paths, surface, object_ids,
         )  # fmt: skip
 
     def _illuminate(
@@ -194,4 +257,5 @@ class Wavefront:
         return first, second, third
 
     def _launch(self, name: str, size: int, *args: Any, features: tuple[str, ...] = ()) -> None:
+        size = max(size, self._least_size)
         self.device.launch(self.device.kernel(name, features=features), size, *args)
