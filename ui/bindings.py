@@ -1,0 +1,159 @@
+"""The one table of what the mouse does in the picture, in two sets: as in Blender, and plain.
+
+The viewport looks a press of a button up here, and Help shows the table. Keys of commands stand in
+`commands`; the keys that fly stand here, because they are held.
+
+A press that moves less than CLICK_PX until it is released is a click and selects; from there on it is a
+drag and moves the camera, even with the button that selects. So no button has to choose between the two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from enum import Enum
+
+CLICK_PX = 4.0
+"""Movement from which on a press is a drag, pixels of the screen at a scale of 1."""
+
+SHIFT, CTRL, ALT = "shift", "ctrl", "alt"
+
+
+class Action(Enum):
+    """What the mouse does in the picture."""
+
+    ORBIT = "orbit"
+    PAN = "pan"
+    DOLLY = "dolly"
+    ZOOM = "zoom"
+    FLY = "fly"
+    SELECT = "select"
+    SELECT_MORE = "select more"
+
+
+class Button(Enum):
+    """What is pressed or turned. A key toggles flying; a button held flies while it is held."""
+
+    LEFT = "left"
+    MIDDLE = "middle"
+    RIGHT = "right"
+    WHEEL = "wheel"
+    GRAVE = "`"
+
+
+@dataclass(frozen=True)
+class Binding:
+    """One line of the table: `modifiers` are exactly those that must be held."""
+
+    button: Button
+    modifiers: frozenset[str]
+    action: Action
+    description: str
+
+    @property
+    def keys(self) -> str:
+        """What to do, as Help shows it: "Shift + middle drag"."""
+        held = [name.capitalize() for name in (CTRL, ALT, SHIFT) if name in self.modifiers]
+        gesture = {Button.WHEEL: "wheel", Button.GRAVE: "`"}.get(self.button)
+        if gesture is None:
+            is_click = self.action in (Action.SELECT, Action.SELECT_MORE)
+            gesture = f"{self.button.value} {'click' if is_click else 'drag'}"
+        text = " + ".join([*held, gesture])
+        return text[0].upper() + text[1:]
+
+
+def _binding(keys: str, action: Action, description: str) -> Binding:
+    *modifiers, button = keys.split("+")
+    return Binding(Button(button), frozenset(modifiers), action, description)
+
+
+CLICKS = (
+    _binding("left", Action.SELECT, "Select what is under the cursor; on nothing: deselect"),
+    _binding("right", Action.SELECT, "The same"),
+    _binding("ctrl+left", Action.SELECT_MORE, "Add it to the selection, or take it out"),
+    _binding("ctrl+right", Action.SELECT_MORE, "The same"),
+)
+"""In both sets."""
+
+_WHEEL = _binding("wheel", Action.ZOOM, "Zoom towards the cursor")
+
+NAVIGATION: dict[str, tuple[Binding, ...]] = {
+    # Alt with the left button stands in for a middle button that a touchpad has not: Blender's "Emulate 3
+    # Button Mouse".
+    "blender": (
+        _binding("middle", Action.ORBIT, "Orbit around the target"),
+        _binding("shift+middle", Action.PAN, "Pan"),
+        _binding("ctrl+middle", Action.DOLLY, "Move nearer or farther"),
+        _WHEEL,
+        _binding("alt+left", Action.ORBIT, "Orbit, without a middle button"),
+        _binding("alt+shift+left", Action.PAN, "Pan, without a middle button"),
+        _binding("alt+ctrl+left", Action.DOLLY, "Move nearer or farther, without a middle button"),
+        _binding("shift+`", Action.FLY, "Fly until a click or Escape"),
+    ),
+    # Maya's three with Alt, and the bare buttons of viewers such as Sketchfab and Unreal: many desktops
+    # keep Alt + left drag for themselves.
+    "plain": (
+        _binding("left", Action.ORBIT, "Orbit around the target"),
+        _binding("middle", Action.PAN, "Pan"),
+        _binding("right", Action.FLY, "Look around, and fly while it is held"),
+        _WHEEL,
+        _binding("shift+left", Action.PAN, "Pan"),
+        _binding("alt+left", Action.ORBIT, "Orbit, as in Maya"),
+        _binding("alt+middle", Action.PAN, "Pan, as in Maya"),
+        _binding("alt+right", Action.DOLLY, "Move nearer or farther, as in Maya"),
+    ),
+}
+"""Drags, the wheel and keys, by name of the set (`preferences.NAVIGATIONS`)."""
+
+
+@dataclass(frozen=True)
+class FlyKey:
+    """A key that flies while it is held: its direction as `camera_moves.fly` takes it."""
+
+    key: str
+    forward: float
+    right: float
+    up: float
+    description: str
+
+
+FLY_KEYS = (
+    FlyKey("w", 1, 0, 0, "Fly forward"),
+    FlyKey("s", -1, 0, 0, "Fly back"),
+    FlyKey("a", 0, -1, 0, "Fly left"),
+    FlyKey("d", 0, 1, 0, "Fly right"),
+    FlyKey("e", 0, 0, 1, "Fly up"),
+    FlyKey("q", 0, 0, -1, "Fly down"),
+)
+FLY_FAST = 4.0
+"""Of the speed while Shift is held."""
+
+
+def action_for(navigation: str, button: Button, modifiers: Collection[str]) -> Action | None:
+    """What a drag with a button, a turn of the wheel or a key does in a set; None: nothing."""
+    return _found(NAVIGATION[navigation], button, modifiers)
+
+
+def click_action(button: Button, modifiers: Collection[str]) -> Action | None:
+    """What a click does, in both sets; None: nothing."""
+    return _found(CLICKS, button, modifiers)
+
+
+def is_drag(dx: float, dy: float, scale: float = 1.0) -> bool:
+    """Whether a press that moved so many pixels is a drag, on a screen of that scale."""
+    return dx * dx + dy * dy >= (CLICK_PX * scale) ** 2
+
+
+def help_lines(navigation: str) -> list[tuple[str, str]]:
+    """(what to do, what it does) for Help: clicks, then the set, then the keys that fly."""
+    lines = [(binding.keys, binding.description) for binding in (*CLICKS, *NAVIGATION[navigation])]
+    lines += [(fly.key.upper(), f"{fly.description}, while flying") for fly in FLY_KEYS]
+    return [*lines, ("Shift", f"Fly {FLY_FAST:g} times as fast")]
+
+
+def _found(bindings: tuple[Binding, ...], button: Button, modifiers: Collection[str]) -> Action | None:
+    held = frozenset(modifiers)
+    for binding in bindings:
+        if binding.button is button and binding.modifiers == held:
+            return binding.action
+    return None
