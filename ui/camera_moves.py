@@ -31,6 +31,9 @@ WHEEL_FACTOR = 0.85
 DOLLY_FACTOR = 8.0
 """Of the distance, for a drag over the whole height of the picture."""
 FRAME_MARGIN = 1.1
+"""Of the picture over what is framed in it."""
+FRAME_CLEARANCE = 0.1
+"""Least distance from the nearest corner of what is framed, in diagonals of its box."""
 NEAREST = 1e-3
 """Least distance to the target, metres, and relative to its coordinates 1e-6: what float32 can tell apart."""
 
@@ -111,7 +114,9 @@ def frame(camera: Camera, bounds: npt.ArrayLike, aspect: float) -> Camera:
     x = np.abs(offset @ right) / (right @ right)
     y = np.abs(offset @ up) / (up @ up)
     depth = offset @ forward
-    distance = float((FRAME_MARGIN * np.maximum(x, y) - depth).max())
+    # A plate or a rod seen along itself would else be looked at from its very edge.
+    clearance = FRAME_CLEARANCE * float(np.linalg.norm(box[1] - box[0]))
+    distance = float((np.maximum(FRAME_MARGIN * np.maximum(x, y), clearance) - depth).max())
     return _with(camera, middle - forward * distance, middle)
 
 
