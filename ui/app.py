@@ -1,0 +1,169 @@
+"""`incpt edit`: opens the window and runs the loop."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from imgui_bundle import imgui, implot
+
+from incpt.errors import OutputError
+from incpt.ui import actions, preferences, recovery
+from incpt.ui.dialogs import Choice, Question
+from incpt.ui.display import Display
+from incpt.ui.document import Document
+from incpt.ui.editor import Editor
+from incpt.ui.renderer import ThreadedRenderer
+from incpt.ui.viewport import Rect, Viewport
+from incpt.ui.window import Window
+from incpt.ui.workspace import Workspace
+
+_IDLE_SECONDS = 0.5
+"""How long the loop sleeps without an event: messages go away and autosaves are made in between."""
+_WAITING_SECONDS = 0.05
+"""The same while an entry of the history waits for a rest."""
+
+
+class App:
+    """The editor in its window. `frame` does one turn of the loop; the caller owns the loop."""
+
+    def __init__(self, document: Document, device: str | None = None, opened: Path | None = None) -> None:
+        kept, complaints = preferences.load()
+        self.window = Window(kept.window_size, "incpt", preferences.layout_path(), kept.ui_scale)
+        implot.create_context()
+        self.display = Display(self.window.context)
+        self.renderer = ThreadedRenderer(device, self.window.wake)
+        self.editor = Editor(document, self.renderer, kept)
+        self.editor.start_over(document, opened)
+        self.workspace = Workspace()
+        self.viewport = Viewport()
+        self.recovery = recovery.Recovery(kept.autosave_seconds)
+        for complaint in complaints:
+            self.editor.messages.add(complaint, "warning")
+        self._rect: Rect = (0.0, 0.0, 1.0, 1.0)
+        self._shown_frame: object = None
+        self._kept = kept
+        self.renderer.show(self.editor.view)
+        self._offer_recovery()
+
+    def run(self) -> None:
+        """The loop, until the window is closed."""
+        try:
+            while not self.editor.is_closing:
+                self.turn()
+        finally:
+            self.close()
+
+    def turn(self) -> None:
+        """Wait for something to happen, and draw a frame if it did."""
+        editor = self.editor
+        wait = 0.0 if editor.is_flying else _WAITING_SECONDS if editor.is_waiting else _IDLE_SECONDS
+        is_due = self.window.wait(wait)
+        if editor.receive():
+            self.window.redraw()
+            is_due = True
+        if is_due or editor.is_waiting or self._has_message_ended():
+            self.frame()
+        self._autosave()
+
+    def frame(self, is_swapped: bool = True) -> None:
+        """Draw one frame and take its edits; `is_swapped` brings it to the screen."""
+        editor, window = self.editor, self.window
+        if window.wants_to_close:
+            window.wants_to_close = False
+            actions.quit_(editor)
+        for path in window.take_dropped():
+            editor.attempt(lambda path=path: actions.drop(editor, path))  # type: ignore[misc]
+        if editor.frame is not None and editor.frame is not self._shown_frame:
+            self.display.upload(editor.frame.pictures, editor.frame.aovs)
+            self._shown_frame = editor.frame
+        window.begin_frame()
+        self._rect = self.workspace.draw(editor)
+        is_held = self.viewport.update(editor, self._rect) or imgui.is_any_item_active()
+        editor.is_flying = self.viewport.is_flying
+        editor.settle(is_held)
+        window.set_title(editor.title)
+        window.end_frame(self._draw_below, is_swapped)
+        self._keep_preferences()
+
+    def close(self) -> None:
+        """Stop the renderer, keep the preferences, close the window."""
+        self.renderer.close()
+        self.recovery.close()
+        self.editor.preferences = replace(self.editor.preferences, window_size=self.window.size)
+        self._keep_preferences()
+        self.display.release()
+        implot.destroy_context()
+        self.window.close()
+
+    def read_pixels(self) -> npt.NDArray[np.uint8]:
+        """(H, W, 3) the frame drawn last, row 0 on top."""
+        width, height = self.window.framebuffer_size
+        # A frame of its own: after the buffers were swapped the back buffer holds nothing that is defined.
+        self.frame(is_swapped=False)
+        flat = np.frombuffer(self.window.context.screen.read(components=3, alignment=1), np.uint8)
+        return flat.reshape(height, width, 3)[::-1]
+
+    def _draw_below(self) -> None:
+        pixels = imgui.get_io().display_framebuffer_scale.x
+        size = self.window.framebuffer_size
+        self.viewport.draw(self.editor, self.display, self._rect, size, pixels)
+
+    def _has_message_ended(self) -> bool:
+        end = self.editor.messages.next_end
+        return end is not None and self.editor.now() >= end
+
+    def _keep_preferences(self) -> None:
+        if self.editor.preferences != self._kept and not imgui.is_any_item_active():
+            self._kept = self.editor.preferences
+            try:
+                preferences.save(self._kept)
+            except OutputError as error:
+                self.editor.messages.add(str(error), "warning")
+
+    def _autosave(self) -> None:
+        self.editor.attempt(lambda: self.recovery.update(self.editor.document, self.editor.now()))
+
+    def _offer_recovery(self) -> None:
+        editor = self.editor
+        for found in recovery.find_left_behind():
+            written = time.strftime("%Y-%m-%d %H:%M", time.localtime(found.time))
+            editor.dialog = Question(
+                "Recover",
+                f"The editor ended without saving {found.name}. Open what it had on {written}?",
+                (
+                    Choice("Recover", partial(self._recover, found)),
+                    Choice("Discard", partial(recovery.discard, found)),
+                    Choice("Later", lambda: None),
+                ),
+            )
+            return
+
+    def _recover(self, found: recovery.LeftBehind) -> None:
+        self.editor.start_over(self.recovery.recover(found))
+
+
+def main(arguments: Sequence[str]) -> int:
+    """`incpt edit [SCENE|MESH] [--device NAME]`; returns the exit status."""
+    options = _parse(arguments)
+    path = options.file.expanduser() if options.file is not None else None
+    document = Document.example() if path is None else Document.open(path)
+    App(document, options.device, path).run()
+    return 0
+
+
+def _parse(arguments: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="incpt edit", description="Edit a scene under its path-traced picture."
+    )
+    parser.add_argument("file", nargs="?", type=Path, help="scene file or mesh (default: an example)")
+    parser.add_argument("--device", default=os.environ.get("INCPT_DEVICE"),
+                        help="index or part of the name, as `incpt devices` lists them")  # fmt: skip
+    return parser.parse_args(arguments)

@@ -1,0 +1,1 @@
+"""The panels: functions that draw values and return what the user made of them."""

@@ -1,0 +1,36 @@
+"""How the picture is shown, and what is laid over it: nothing here is rendered anew."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from incpt.ui import widgets
+from incpt.ui.preferences import DisplaySettings
+
+CURVE_TEXTS = {"agx": "AgX", "filmic": "Filmic", "srgb": "sRGB, clipped"}
+
+
+def draw(display: DisplaySettings, overlays: Sequence[tuple[str, str]]) -> DisplaySettings:
+    """Fields of the display settings; returns them after this frame."""
+    exposure = widgets.number(
+        "Exposure", display.exposure, low=-10.0, high=10.0, speed=0.02, unit=" EV", decimals=2
+    )
+    curve = widgets.choice("Curve", display.curve, list(CURVE_TEXTS.items()), "Tone mapping")
+    overlay = widgets.choice("Overlay", display.overlay, overlays, "Laid over the picture")
+    opacity = display.overlay_opacity
+    if overlay != "none":
+        opacity = widgets.number("Opacity", opacity, low=0.0, high=1.0, speed=0.01, decimals=2)
+    grid = widgets.checkbox("Tile grid", display.tile_grid)
+    outline = widgets.checkbox("Outline", display.outline, "Around the selection")
+    split = widgets.checkbox("Split view", display.split, "Left: restart, right: the chosen strategy")
+    return replace(
+        display,
+        exposure=min(max(exposure, -20.0), 20.0),
+        curve=curve,
+        overlay=overlay,
+        overlay_opacity=min(max(opacity, 0.0), 1.0),
+        tile_grid=grid,
+        outline=outline,
+        split=split,
+    )

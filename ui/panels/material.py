@@ -1,0 +1,108 @@
+"""Materials: all parameters of one, and which object has which."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from incpt.scene import Material
+from incpt.ui import widgets
+from incpt.ui.widgets import Refusals
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the user asked for in a frame, besides parameters: assign, make, duplicate, rename or delete."""
+
+    assign: str | None = None
+    is_new: bool = False
+    is_duplicate: bool = False
+    is_rename: bool = False
+    is_delete: bool = False
+
+
+def draw_choice(names: tuple[str, ...], current: str, users: int) -> Outcome:
+    """The material of the selected objects, and buttons for new ones. `users`: objects that have it."""
+    options = [(name, name) for name in names]
+    chosen = widgets.choice("Material", current, options, "Assigned to every selected object")
+    with widgets.row(f"{users} {'object' if users == 1 else 'objects'}", "Objects that have this material"):
+        is_new = widgets.button("New##material", "A new material for the selected objects")
+        widgets.same_line()
+        is_duplicate = widgets.button("Duplicate##material", "A copy of it for the selected objects")
+    with widgets.row("", ""):
+        is_rename = widgets.button("Rename…##material")
+        widgets.same_line()
+        is_delete = widgets.button("Delete##material", "A material that objects have asks for another first")
+    return Outcome(chosen if chosen != current else None, is_new, is_duplicate, is_rename, is_delete)
+
+
+def draw(material: Material, refusals: Refusals) -> Material:
+    """Fields for all parameters; returns the material after this frame."""
+    material = _set(
+        material,
+        refusals,
+        "base_color",
+        widgets.color(
+            "Base colour", material.base_color, tip="Diffuse albedo; of metals the reflectance. Linear RGB"
+        ),
+    )
+    material = _share(material, refusals, "metallic", "Metallic", "0: dielectric, 1: metal")
+    material = _share(material, refusals, "roughness", "Roughness", "GGX alpha is its square")
+    material = _share(material, refusals, "specular", "Specular", "Dielectric layer; 0 is exactly Lambertian")
+    material = _set(
+        material,
+        refusals,
+        "ior",
+        widgets.number("IOR", material.ior, low=1.0, high=4.0, speed=0.005, tip="Index of refraction"),
+    )
+    material = _draw_glass(material, refusals)
+    return _draw_emission(material, refusals)  # fmt: skip
+
+
+def _draw_glass(material: Material, refusals: Refusals) -> Material:
+    with widgets.section("Transmission", material.transmission > 0) as is_open:
+        if not is_open:
+            return material
+        material = _share(material, refusals, "transmission", "Transmission", "1: glass")
+        material = _set(
+            material,
+            refusals,
+            "absorption",
+            widgets.vector(
+                "Absorption",
+                material.absorption,
+                speed=0.05,
+                high=1e6,
+                unit=" /m",
+                names=("R", "G", "B"),
+                tip="Per metre of the way inside",
+            ),
+        )
+        return _set(material, refusals, "priority", widgets.whole_number(
+            "Priority", material.priority, low=0, high=1000,
+            tip="Where bodies overlap the higher wins; 0 is the highest of all"))  # fmt: skip
+
+
+def _draw_emission(material: Material, refusals: Refusals) -> Material:
+    with widgets.section("Emission", material.is_emissive) as is_open:
+        if not is_open:
+            return material
+        material = _set(
+            material,
+            refusals,
+            "emission",
+            widgets.radiance("Emission", material.emission, tip="Radiance: colour times strength"),
+        )
+        return _set(material, refusals, "double_sided", widgets.checkbox(
+            "Double sided", material.double_sided, "Emission from the back too"))  # fmt: skip
+
+
+def _share(material: Material, refusals: Refusals, name: str, label: str, tip: str) -> Material:
+    value = widgets.number(label, getattr(material, name), low=0.0, high=1.0, speed=0.005, tip=tip)
+    return _set(material, refusals, name, value)
+
+
+def _set(material: Material, refusals: Refusals, name: str, value: Any) -> Material:
+    if value == getattr(material, name):
+        return material
+    return refusals.accepted(material, lambda: replace(material, **{name: value}))

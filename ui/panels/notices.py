@@ -1,0 +1,94 @@
+"""What the editor says: the bar at the bottom, messages over the picture, the building of kernels."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from incpt.ui import places, theme
+from incpt.ui.editor import Editor
+from incpt.ui.panels.render import MODE_TEXTS
+
+Rect = tuple[float, float, float, float]
+
+_COLORS = {"done": theme.QUIET, "warning": theme.WARNING, "error": theme.ERROR}
+_FLOATING = (
+    imgui.WindowFlags_.no_decoration
+    | imgui.WindowFlags_.no_docking
+    | imgui.WindowFlags_.no_saved_settings
+    | imgui.WindowFlags_.no_focus_on_appearing
+    | imgui.WindowFlags_.no_nav
+    | imgui.WindowFlags_.always_auto_resize
+)
+
+
+def draw_status_bar(editor: Editor) -> None:
+    """One line at the bottom of the window."""
+    flags = (
+        imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.menu_bar
+    )
+    height = imgui.get_frame_height()
+    viewport = imgui.get_main_viewport()
+    is_shown = imgui.internal.begin_viewport_side_bar("##status", viewport, imgui.Dir.down, height, flags)
+    if is_shown and imgui.begin_menu_bar():
+        imgui.text_unformatted(status_text(editor))
+        places.note("status")
+        imgui.end_menu_bar()
+    imgui.end()
+
+
+def status_text(editor: Editor) -> str:
+    """Mode, samples, selection: what one looks for without opening a panel."""
+    parts = []
+    if editor.frame is not None:
+        picture = editor.frame.pictures[-1]
+        parts.append("Paused" if editor.paused else MODE_TEXTS[picture.mode])
+        parts.append(f"{int(picture.tile_spp.min()):,} samples per pixel")
+        if picture.error is not None:
+            parts.append(f"RMSE {picture.error:.5f}")
+    names = editor.selection.names
+    if len(names) == 1:
+        parts.append(names[0])
+    elif names:
+        parts.append(f"{len(names)} objects selected")
+    return "   |   ".join(parts)
+
+
+def draw_messages(editor: Editor, rect: Rect) -> None:
+    """Messages, at the top left of the picture, below one another."""
+    messages = editor.messages.current()
+    if not messages:
+        return
+    line = imgui.get_text_line_height()
+    imgui.set_next_window_pos(imgui.ImVec2(rect[0] + line * 0.6, rect[1] + line * 0.6))
+    limit = imgui.ImVec2(max(rect[2] - 1.2 * line, 120.0), max(rect[3] - 1.2 * line, 60.0))
+    imgui.set_next_window_size_constraints(imgui.ImVec2(0, 0), limit)
+    imgui.set_next_window_bg_alpha(0.9)
+    if imgui.begin("##messages", None, _FLOATING)[0]:
+        imgui.push_text_wrap_pos(max(rect[2] - 6 * line, 100.0))
+        for i, message in enumerate(messages):
+            imgui.push_id(i)
+            if imgui.small_button("×"):
+                editor.messages.dismiss(message)
+            places.note(f"dismiss {i}")
+            imgui.same_line()
+            imgui.text_colored(imgui.ImVec4(*_COLORS[message.level]), message.text)
+            imgui.pop_id()
+        imgui.pop_text_wrap_pos()
+    imgui.end()
+
+
+def draw_building(editor: Editor, rect: Rect) -> None:
+    """A bar while kernels are compiled, in the middle of the picture."""
+    building = editor.building
+    if building is None or editor.device_failed:
+        return
+    imgui.set_next_window_pos(
+        imgui.ImVec2(rect[0] + rect[2] / 2, rect[1] + rect[3] / 2), imgui.Cond_.always, imgui.ImVec2(0.5, 0.5)
+    )
+    if imgui.begin("##building", None, _FLOATING)[0]:
+        imgui.text_unformatted("Compiling the kernels for this device; they are kept for the next start")
+        width = imgui.get_text_line_height() * 24
+        share = building.done / max(building.total, 1)
+        imgui.progress_bar(share, imgui.ImVec2(width, 0), f"{building.done} of {building.total}")
+        places.note("building")
+    imgui.end()

@@ -1,0 +1,72 @@
+"""The list of objects: select, show and hide, rename."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from imgui_bundle import imgui
+
+from incpt.scene import Scene
+from incpt.ui import places, theme
+from incpt.ui.selection import Selection
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the user did in a frame: the selection after it, an object to show or hide, one to rename."""
+
+    selection: Selection
+    switched: str | None = None
+    renaming: str | None = None
+
+
+def draw(scene: Scene, selection: Selection, search: str) -> tuple[Outcome, str]:
+    """Draw the list of objects whose names hold `search`; returns the outcome and the new search text."""
+    imgui.set_next_item_width(-1)
+    _, search = imgui.input_text_with_hint("##search", "Search", search)
+    places.note("Search")
+    names = [o.name for o in scene.objects if search.strip().lower() in o.name.lower()]
+    outcome = Outcome(selection)
+    if imgui.begin_child("objects"):
+        clipper = imgui.ListClipper()
+        clipper.begin(len(names))
+        while clipper.step():
+            for name in names[clipper.display_start : clipper.display_end]:
+                outcome = _row(scene, name, outcome)
+        _empty_space(names, scene)
+    imgui.end_child()
+    if imgui.is_item_clicked() and not imgui.is_any_item_hovered():
+        outcome = Outcome(Selection())
+    return outcome, search
+
+
+def _row(scene: Scene, name: str, outcome: Outcome) -> Outcome:
+    obj = scene.object(name)
+    selection = outcome.selection
+    imgui.push_id(name)
+    style = imgui.get_style()
+    width = imgui.get_content_region_avail().x
+    button = imgui.calc_text_size("Show").x + 2 * style.frame_padding.x + style.item_spacing.x
+    tint = theme.ACCENT if name == selection.active else theme.TEXT if obj.visible else theme.QUIET
+    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*tint))
+    flags = imgui.SelectableFlags_.allow_double_click
+    pressed, _ = imgui.selectable(name, name in selection.names, flags, imgui.ImVec2(width - button, 0))
+    imgui.pop_style_color()
+    places.note(f"object {name}")
+    if pressed:
+        additive = imgui.get_io().key_ctrl
+        outcome = Outcome(
+            selection.toggled(name) if additive else Selection((name,)),
+            renaming=name if imgui.is_mouse_double_clicked(0) and not additive else None,
+        )
+    imgui.same_line(width - button + style.item_spacing.x)
+    if imgui.small_button("Hide" if obj.visible else "Show"):
+        outcome = Outcome(outcome.selection, switched=name)
+    places.note(f"visible {name}")
+    imgui.pop_id()
+    return outcome
+
+
+def _empty_space(names: list[str], scene: Scene) -> None:
+    if not names:
+        imgui.text_disabled("No object has that in its name." if scene.objects else "The scene is empty.")

@@ -1,0 +1,116 @@
+"""How the picture is rendered: what goes on, and the settings that decide it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from imgui_bundle import imgui
+
+from incpt.live import Frame, Picture
+from incpt.modes import Mode
+from incpt.settings import STRATEGIES, RenderSettings
+from incpt.ui import places, widgets
+from incpt.ui.widgets import Refusals
+
+MODE_TEXTS = {
+    Mode.BASE: "Base: the first picture",
+    Mode.REFINE: "Refine: more samples everywhere",
+    Mode.INCREMENTAL: "Incremental: what the edit affects first",
+}
+STRATEGY_TEXTS = {"restart": "Restart: everything anew", "spiral": "Spiral: from the edit outwards"}
+_TILE_SIZES = (8, 16, 32, 64, 128)
+
+
+@dataclass(frozen=True)
+class Control:
+    """What steers rendering and is no part of the scene."""
+
+    paused: bool
+    target_spp: int | None
+    resolution_scale: float
+    step_ms: float
+    drag_nor: int
+
+
+def draw_state(frame: Frame | None) -> None:
+    """Mode, queue, samples, speed, device."""
+    if frame is None:
+        imgui.text_disabled("No picture yet")
+        return
+    picture = frame.pictures[-1]
+    _draw_progress(picture, frame.resting)
+    least, mean = int(picture.tile_spp.min()), float(picture.tile_spp.mean())
+    widgets.value_row("Samples", f"{least:,} least, {mean:,.1f} mean", "Per pixel")
+    height, width = picture.image.shape[:2]
+    widgets.value_row("Size", f"{width} × {height}" + (" (preview)" if frame.is_preview else ""))
+    widgets.value_row("Speed", f"{frame.paths_per_second / 1e6:.2f} million paths/s")
+    widgets.value_row("Step", f"{frame.step_seconds * 1e3:.1f} ms")
+    widgets.value_row("Device", frame.device)
+    if frame.nonfinite:
+        widgets.value_row("Not finite", f"{frame.nonfinite:,} samples", "They count as black")
+
+
+def _draw_progress(picture: Picture, is_resting: bool) -> None:
+    mode = "At rest" if is_resting else MODE_TEXTS[picture.mode]
+    imgui.text_unformatted(mode)
+    places.note("mode")
+    done, total = picture.queue_done, len(picture.queue)
+    imgui.progress_bar(done / max(total, 1), imgui.ImVec2(-1, 0), f"{done:,} of {total:,} tiles")
+    places.note("queue")
+
+
+def draw_control(control: Control) -> tuple[Control, bool]:
+    """Pause, target, resolution; returns the control after this frame, and whether to restart."""
+    with widgets.row("Rendering"):
+        paused = control.paused
+        if widgets.button("Go on" if paused else "Pause"):
+            paused = not paused
+        widgets.same_line()
+        is_restart = widgets.button("Restart")
+    target = widgets.whole_number(
+        "Target spp", control.target_spp or 0, low=0, high=1 << 20, speed=1.0,
+        tip="Rest when every pixel has that many samples; 0: never",
+    )  # fmt: skip
+    scale = widgets.number(
+        "Resolution", control.resolution_scale * 100, low=5.0, high=400.0, speed=1.0, unit=" %", decimals=0,
+        tip="Of the scene's own size",
+    )  # fmt: skip
+    step_ms = widgets.number(
+        "Step time", control.step_ms, low=5.0, high=500.0, speed=0.5, unit=" ms", decimals=0,
+        tip="A rendering step aims at this time; shorter answers sooner, longer is more efficient",
+    )  # fmt: skip
+    drag_nor = widgets.whole_number(
+        "NoR in a drag", control.drag_nor, low=1, high=1 << 16,
+        tip="Repetitions of a tile while something is dragged; the full NoR starts when it is let go",
+    )  # fmt: skip
+    scale, step_ms = min(max(scale, 5.0), 400.0), min(max(step_ms, 1.0), 1000.0)
+    return Control(paused, target or None, scale / 100, step_ms, drag_nor), is_restart
+
+
+def draw_settings(settings: RenderSettings, refusals: Refusals) -> RenderSettings:
+    """The scene's render settings; returns them after this frame."""
+    strategies = [(name, STRATEGY_TEXTS.get(name, name)) for name in STRATEGIES]
+    settings = _set(settings, refusals, strategy=widgets.choice("Strategy", settings.strategy, strategies))
+    sizes = [(str(size), f"{size} × {size}") for size in sorted({*_TILE_SIZES, settings.tile_size})]
+    tile_size = int(widgets.choice("Tile size", str(settings.tile_size), sizes, "Pixels"))
+    settings = _set(settings, refusals, tile_size=tile_size)
+    for name, label, low, high, tip in (
+        ("nor", "NoR", 1, 1 << 16, "Repetitions of a tile while an edit is rendered"),
+        ("base_nor", "Base NoR", 1, 1 << 10, "Repetitions in Base and Refine"),
+        ("sample_rate", "Sample rate", 1, 64, "Paths per pixel and slot"),
+        ("max_bounces", "Bounces", 0, 200, "Scattering events after the first hit; 0: direct light only"),
+        ("transmission_bounces", "Glass bounces", 0, 200, "Passages through smooth dielectrics"),
+        ("seed", "Seed", 0, (1 << 31) - 1, "Chooses the random numbers"),
+    ):
+        value = widgets.whole_number(label, getattr(settings, name), low=low, high=high, tip=tip)
+        settings = _set(settings, refusals, **{name: value})
+    width = widgets.whole_number("Width", settings.size[0], low=16, high=8192, speed=2.0, tip="Pixels")
+    height = widgets.whole_number("Height", settings.size[1], low=16, high=8192, speed=2.0, tip="Pixels")
+    return _set(settings, refusals, size=(width, height))
+
+
+def _set(settings: RenderSettings, refusals: Refusals, **changes: Any) -> RenderSettings:
+    if all(getattr(settings, name) == value for name, value in changes.items()):
+        return settings
+    return refusals.accepted(settings, lambda: replace(settings, **changes))

@@ -1,0 +1,39 @@
+"""Where widgets were drawn in the frame before, by name: what help, tests and the pictures of the
+documentation point at. Coordinates are imgui's: points from the top left of the window."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+Rect = tuple[float, float, float, float]
+"""Left, top, right, bottom."""
+
+_drawing: dict[str, Rect] = {}
+_drawn: dict[str, Rect] = {}
+
+
+def begin_frame() -> None:
+    """What was noted so far becomes the frame before."""
+    global _drawing, _drawn
+    _drawn, _drawing = _drawing, {}
+
+
+def note(name: str) -> None:
+    """Remember the place of the widget drawn last."""
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    _drawing[name] = (low.x, low.y, high.x, high.y)
+
+
+def note_rect(name: str, rect: Rect) -> None:
+    """Remember a place that is no widget of imgui."""
+    _drawing[name] = rect
+
+
+def find(name: str) -> Rect | None:
+    """The place of a widget in the frame before; None where it was not drawn."""
+    return _drawn.get(name)
+
+
+def names() -> list[str]:
+    """All widgets of the frame before."""
+    return list(_drawn)

@@ -1,0 +1,97 @@
+"""How the editor looks: one font, one accent colour, and greys that do not tint the eye beside a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import imgui_bundle
+from imgui_bundle import ImVec4, imgui
+
+FONT_SIZE = 15.0
+"""Height of text at 100 % scale, in points of the screen."""
+
+Rgba = tuple[float, float, float, float]
+
+ACCENT: Rgba = (0.91, 0.49, 0.16, 1.0)
+"""Of the selection's outline too, so that a marked row and a marked object are seen to belong together."""
+TEXT: Rgba = (0.88, 0.88, 0.88, 1.0)
+QUIET: Rgba = (0.60, 0.60, 0.60, 1.0)
+WARNING: Rgba = (0.98, 0.75, 0.25, 1.0)
+ERROR: Rgba = (1.00, 0.45, 0.40, 1.0)
+
+_COLORS: dict[str, Rgba] = {
+    "text": TEXT,
+    "text_disabled": (0.50, 0.50, 0.50, 1.0),
+    "window_bg": (0.155, 0.155, 0.155, 1.0),
+    "popup_bg": (0.125, 0.125, 0.125, 0.98),
+    "menu_bar_bg": (0.125, 0.125, 0.125, 1.0),
+    "border": (0.08, 0.08, 0.08, 1.0),
+    "frame_bg": (0.235, 0.235, 0.235, 1.0),
+    "frame_bg_hovered": (0.29, 0.29, 0.29, 1.0),
+    "frame_bg_active": (0.33, 0.33, 0.33, 1.0),
+    "title_bg": (0.11, 0.11, 0.11, 1.0),
+    "title_bg_active": (0.11, 0.11, 0.11, 1.0),
+    "tab": (0.125, 0.125, 0.125, 1.0),
+    "tab_hovered": (0.26, 0.26, 0.26, 1.0),
+    "tab_selected": (0.20, 0.20, 0.20, 1.0),
+    "tab_dimmed": (0.11, 0.11, 0.11, 1.0),
+    "tab_dimmed_selected": (0.17, 0.17, 0.17, 1.0),
+    "tab_selected_overline": ACCENT,
+    "header": (0.30, 0.30, 0.30, 1.0),
+    "header_hovered": (0.27, 0.27, 0.27, 1.0),
+    "header_active": (0.34, 0.34, 0.34, 1.0),
+    "button": (0.27, 0.27, 0.27, 1.0),
+    "button_hovered": (0.34, 0.34, 0.34, 1.0),
+    "button_active": (0.42, 0.42, 0.42, 1.0),
+    "check_mark": ACCENT,
+    "checkbox_selected_bg": (0.235, 0.235, 0.235, 1.0),
+    "slider_grab": (0.55, 0.55, 0.55, 1.0),
+    "slider_grab_active": ACCENT,
+    "separator": (0.09, 0.09, 0.09, 1.0),
+    "separator_hovered": ACCENT,
+    "separator_active": ACCENT,
+    "resize_grip": (0.0, 0.0, 0.0, 0.0),
+    "plot_histogram": ACCENT,
+    "plot_lines": (0.75, 0.75, 0.75, 1.0),
+    "docking_preview": (0.91, 0.49, 0.16, 0.5),
+    "docking_empty_bg": (0.0, 0.0, 0.0, 0.0),
+    "nav_cursor": ACCENT,
+    "text_selected_bg": (0.91, 0.49, 0.16, 0.45),
+    "drag_drop_target": ACCENT,
+}
+
+
+def load_font() -> None:
+    """Put the text font into imgui's atlas. The file comes with imgui-bundle."""
+    folder = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "Roboto"
+    imgui.get_io().fonts.add_font_from_file_ttf(str(folder / "Roboto-Regular.ttf"), FONT_SIZE)
+
+
+def apply(scale: float) -> None:
+    """Colours and sizes for a display where a point has `scale` pixels."""
+    style = imgui.get_style()
+    _reset(style)
+    imgui.style_colors_dark(style)
+    for name, color in _COLORS.items():
+        style.set_color_(getattr(imgui.Col_, name), ImVec4(*color))
+    style.frame_rounding = style.grab_rounding = style.popup_rounding = style.tab_rounding = 3.0
+    style.window_border_size = 0.0
+    style.window_padding = imgui.ImVec2(9.0, 8.0)
+    style.frame_padding = imgui.ImVec2(7.0, 3.5)
+    style.item_spacing = imgui.ImVec2(7.0, 5.0)
+    style.item_inner_spacing = imgui.ImVec2(5.0, 4.0)
+    style.scrollbar_size = 11.0
+    style.indent_spacing = 12.0
+    style.window_menu_button_position = imgui.Dir.none
+    style.scale_all_sizes(scale)
+    style.font_size_base = FONT_SIZE
+    style.font_scale_dpi = scale
+
+
+def _reset(style: imgui.Style) -> None:
+    # scale_all_sizes multiplies what is there, so a second scale has to start from the defaults again.
+    fresh = imgui.Style()
+    for name in dir(fresh):
+        value = getattr(fresh, name)
+        if not name.startswith("_") and isinstance(value, (int, float, imgui.ImVec2)):
+            setattr(style, name, value)

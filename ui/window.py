@@ -1,0 +1,187 @@
+"""The window: GLFW, a moderngl core context, and imgui's own compiled backends for both."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from imgui_bundle import imgui  # before glfw, whose library it brings
+
+import glfw  # isort: skip
+import moderngl
+
+from incpt.errors import DeviceError
+from incpt.ui import theme
+
+_GLSL = "#version 330"
+_SETTLING_FRAMES = 3
+"""Frames that imgui needs after an event until hover, layout and tooltips are at rest."""
+
+
+class Window:
+    """A window with a context that is current, and imgui in it. Raises DeviceError where none opens."""
+
+    def __init__(self, size: tuple[int, int], title: str, layout_file: Path, scale: float | None) -> None:
+        _init_glfw()
+        for hint, value in (
+            (glfw.CONTEXT_VERSION_MAJOR, 3),
+            (glfw.CONTEXT_VERSION_MINOR, 3),
+            (glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE),
+            (glfw.OPENGL_FORWARD_COMPAT, True),  # macOS gives no core profile without it
+            (glfw.SCALE_TO_MONITOR, True),
+        ):
+            glfw.window_hint(hint, value)
+        self.handle = glfw.create_window(*size, title, None, None)
+        if not self.handle:
+            glfw.terminate()
+            raise DeviceError("the window needs OpenGL 3.3; install or update the graphics driver")
+        glfw.make_context_current(self.handle)
+        glfw.swap_interval(1)
+        self.context = moderngl.create_context(require=330)
+        self.dropped: list[Path] = []
+        self.wants_to_close = False
+        self._title = title
+        self._frames_due = _SETTLING_FRAMES
+        self._fixed_scale = scale
+        self._listen()
+        self._start_imgui(layout_file)
+
+    def _listen(self) -> None:
+        # Before imgui's backend, which calls the callbacks that it finds.
+        for listen in (
+            glfw.set_cursor_pos_callback,
+            glfw.set_mouse_button_callback,
+            glfw.set_scroll_callback,
+            glfw.set_key_callback,
+            glfw.set_char_callback,
+            glfw.set_window_focus_callback,
+            glfw.set_cursor_enter_callback,
+            glfw.set_framebuffer_size_callback,
+            glfw.set_window_refresh_callback,
+        ):
+            listen(self.handle, lambda *_: self.redraw())
+        glfw.set_drop_callback(self.handle, self._drop)
+        glfw.set_window_close_callback(self.handle, self._close_asked)
+
+    def _start_imgui(self, layout_file: Path) -> None:
+        imgui.create_context()
+        io = imgui.get_io()
+        io.config_flags |= imgui.ConfigFlags_.docking_enable
+        io.config_windows_move_from_title_bar_only = True
+        io.config_drag_click_to_input_text = False
+        io.set_ini_filename(str(layout_file))
+        theme.load_font()
+        self._scale = 0.0
+        self._follow_scale()
+        address = ctypes.cast(self.handle, ctypes.c_void_p).value
+        assert address is not None
+        imgui.backends.glfw_init_for_opengl(address, True)
+        imgui.backends.opengl3_init(_GLSL)
+
+    @property
+    def scale(self) -> float:
+        """Pixels of the framebuffer per point of the user interface."""
+        return self._scale
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height as the system counts them: what to open the next window with."""
+        width, height = glfw.get_window_size(self.handle)
+        return width, height
+
+    @property
+    def framebuffer_size(self) -> tuple[int, int]:
+        width, height = glfw.get_framebuffer_size(self.handle)
+        return width, height
+
+    def redraw(self) -> None:
+        """Draw the next few frames, whatever happens."""
+        self._frames_due = _SETTLING_FRAMES
+
+    def wait(self, timeout_seconds: float) -> bool:
+        """Take events, at most waiting that long for the first one; returns whether a frame is due."""
+        if self._frames_due > 0:
+            glfw.poll_events()
+        else:
+            glfw.wait_events_timeout(timeout_seconds)
+        due = self._frames_due > 0
+        self._frames_due = max(self._frames_due - 1, 0)
+        return due
+
+    @staticmethod
+    def wake() -> None:
+        """End `wait`, from any thread."""
+        glfw.post_empty_event()
+
+    def begin_frame(self) -> None:
+        self._follow_scale()
+        imgui.backends.opengl3_new_frame()
+        imgui.backends.glfw_new_frame()
+        imgui.new_frame()
+
+    def end_frame(self, draw_below: Callable[[], None], is_swapped: bool = True) -> None:
+        """Show the frame; `draw_below` draws into the framebuffer what lies below the panels."""
+        imgui.render()
+        self.context.screen.use()
+        self.context.viewport = (0, 0, *self.framebuffer_size)
+        self.context.clear(0.085, 0.085, 0.085)
+        draw_below()
+        self.context.screen.use()
+        imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
+        if is_swapped:
+            glfw.swap_buffers(self.handle)
+
+    def set_title(self, title: str) -> None:
+        if title != self._title:
+            self._title = title
+            glfw.set_window_title(self.handle, title)
+
+    def take_dropped(self) -> list[Path]:
+        """Files dropped on the window since the last call."""
+        dropped, self.dropped = self.dropped, []
+        return dropped
+
+    def close(self) -> None:
+        """Close the window for good; imgui writes its layout."""
+        imgui.backends.opengl3_shutdown()
+        imgui.backends.glfw_shutdown()
+        imgui.destroy_context()
+        self.context.release()
+        glfw.destroy_window(self.handle)
+        glfw.terminate()
+
+    def _follow_scale(self) -> None:
+        # On macOS a point of the window is a point already; elsewhere the content scale tells.
+        content = glfw.get_window_content_scale(self.handle)[0]
+        points = self.framebuffer_size[0] / max(self.size[0], 1)
+        scale = self._fixed_scale or content / max(points, 1.0)
+        if scale != self._scale:
+            self._scale = scale
+            theme.apply(scale)
+
+    def _drop(self, _window: Any, paths: Any, *_: Any) -> None:
+        # The stubs of glfw have the C signature; the wrapper passes a list of paths.
+        self.dropped += map(Path, paths)
+        self.redraw()
+
+    def _close_asked(self, window: Any) -> None:
+        glfw.set_window_should_close(window, False)
+        self.wants_to_close = True
+        self.redraw()
+
+
+def _init_glfw() -> None:
+    # GLFW prints its errors unless somebody listens.
+    messages: list[str] = []
+    glfw.set_error_callback(lambda _code, text: messages.append(_text(text)))
+    if not glfw.init():
+        reason = messages[-1] if messages else "the system gives no reason"
+        raise DeviceError(
+            f"no window can be opened ({reason}); the editor needs a display, rendering does not"
+        )
+
+
+def _text(message: Any) -> str:
+    return message.decode(errors="replace") if isinstance(message, bytes) else str(message)

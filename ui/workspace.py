@@ -1,0 +1,217 @@
+"""Where the panels stand, and how what they return becomes edits: the one place that joins the two."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from imgui_bundle import imgui
+
+from incpt.scene import Object, Scene
+from incpt.ui import actions, dialogs, menus, objects, places, widgets
+from incpt.ui.commands import OVERLAY_NAMES
+from incpt.ui.editor import Editor
+from incpt.ui.panels import display as display_panel
+from incpt.ui.panels import material as material_panel
+from incpt.ui.panels import notices, outliner, plots, render, scene_panel, transform
+from incpt.ui.panels.plots import Records
+from incpt.ui.renderer import Restart
+from incpt.ui.widgets import Refusals
+
+_RIGHT_SHARE, _OUTLINER_SHARE = 0.25, 0.28
+
+
+class Workspace:
+    """The panels around the viewport, with what they remember between two frames."""
+
+    def __init__(self) -> None:
+        self.records = Records()
+        self._search = ""
+        self._is_uniform = True
+        self._is_laid_out = False
+        self._shows_first_tab = False
+
+    def draw(self, editor: Editor) -> tuple[float, float, float, float]:
+        """Draw menus, panels and dialogs; returns the rectangle that is left for the picture: left, top,
+        width, height, in points."""
+        places.begin_frame()
+        menus.draw_menu_bar(editor)
+        notices.draw_status_bar(editor)
+        rect = self._dock(editor)
+        self._window("Outliner", editor, self._draw_outliner)
+        self._window("Object", editor, self._draw_object)
+        self._window("Scene", editor, self._draw_scene)
+        self._window("Render", editor, self._draw_render)
+        self._window("Method", editor, self._draw_method)
+        if self._shows_first_tab:
+            imgui.set_window_focus("Object")
+            self._shows_first_tab = False
+        notices.draw_messages(editor, rect)
+        notices.draw_building(editor, rect)
+        dialogs.draw(editor)
+        menus.press_keys(editor)
+        return rect
+
+    def _dock(self, editor: Editor) -> tuple[float, float, float, float]:
+        root = imgui.get_id("incpt workspace")
+        is_known = imgui.internal.dock_builder_get_node(root) is not None
+        if editor.asked_layout_reset or not (self._is_laid_out or is_known):
+            _lay_out(root)
+            editor.asked_layout_reset = False
+            self._shows_first_tab = True
+        self._is_laid_out = True
+        imgui.dock_space_over_viewport(root, None, imgui.DockNodeFlags_.passthru_central_node)
+        node = imgui.internal.dock_builder_get_central_node(root)
+        return node.pos.x, node.pos.y, node.size.x, node.size.y
+
+    def _window(self, name: str, editor: Editor, draw: object) -> None:
+        assert callable(draw)
+        if imgui.begin(name, None, imgui.WindowFlags_.no_collapse)[0]:
+            draw(editor)
+        imgui.end()
+
+    # ---------------------------------------------------------------------------------- one panel each
+
+    def _draw_outliner(self, editor: Editor) -> None:
+        outcome, self._search = outliner.draw(editor.scene, editor.selection, self._search)
+        if outcome.selection != editor.selection:
+            editor.select(outcome.selection)
+        if outcome.switched is not None:
+            is_shown = editor.scene.object(outcome.switched).visible
+            scene = objects.set_visible(editor.scene, (outcome.switched,), not is_shown)
+            editor.propose(scene, "Hide" if is_shown else "Show")
+        if outcome.renaming is not None:
+            actions.rename(editor)
+
+    def _draw_object(self, editor: Editor) -> None:
+        name = editor.selection.active
+        if name is None:
+            widgets.note("Select an object: click it in the picture or in the outliner.")
+            return
+        count = len(editor.selection.names)
+        new_name = widgets.text("Name", name)
+        if new_name is not None:
+            editor.attempt(lambda: actions.rename_to(editor, name, new_name))
+            return
+        if count > 1:
+            widgets.note(f"{count} objects are selected; the fields show this one.")
+        refusals = Refusals()
+        obj = editor.scene.object(name)
+        with widgets.section("Transform") as is_open:
+            if is_open:
+                new, self._is_uniform = transform.draw(obj, self._is_uniform, refusals)
+                if new is not obj:
+                    editor.propose(_with_object(editor.scene, name, new), "Transform", _key())
+        self._draw_material(editor, name, refusals)
+        widgets.show_refusals(refusals)
+
+    def _draw_material(self, editor: Editor, name: str, refusals: Refusals) -> None:
+        scene = editor.scene
+        material = scene.object(name).material
+        with widgets.section("Material") as is_open:
+            if not is_open:
+                return
+            users = sum(o.material == material for o in scene.objects)
+            outcome = material_panel.draw_choice(tuple(scene.materials), material, users)
+            new = material_panel.draw(scene.materials[material], refusals)
+        if new is not scene.materials[material]:
+            materials = {**scene.materials, material: new}
+            editor.propose(replace(scene, materials=materials), f"Material {material}", _key())
+        editor.attempt(lambda: _apply_material_outcome(editor, material, outcome))
+
+    def _draw_scene(self, editor: Editor) -> None:
+        refusals = Refusals()
+        scene = editor.scene
+        with widgets.section("Camera") as is_open:
+            if is_open:
+                camera = scene_panel.draw_camera(scene.camera, refusals)
+                if camera is not scene.camera:
+                    editor.propose(replace(scene, camera=camera), "Camera", _key())
+                if widgets.button("Frame selected##camera"):
+                    actions.frame_selected(editor)
+                widgets.same_line()
+                if widgets.button("Reset##camera"):
+                    actions.reset_camera(editor)
+        scene = editor.scene
+        with widgets.section("Environment") as is_open:
+            if is_open:
+                environment, asked = scene_panel.draw_environment(scene.environment, refusals)
+                if environment is not scene.environment:
+                    editor.propose(replace(scene, environment=environment), "Environment", _key())
+                if asked.is_choose:
+                    actions.choose_environment(editor)
+                if asked.is_remove:
+                    editor.propose(editor.scene.with_environment(image=None), "Remove image")
+        widgets.show_refusals(refusals)
+
+    def _draw_render(self, editor: Editor) -> None:
+        render.draw_state(editor.frame)
+        imgui.separator()
+        preferences = editor.preferences
+        control = render.Control(
+            editor.paused, editor.target_spp, preferences.resolution_scale, preferences.step_ms,
+            preferences.drag_nor,
+        )  # fmt: skip
+        new, is_restart = render.draw_control(control)
+        editor.steer(new)
+        if is_restart:
+            editor.renderer.request(Restart())
+        refusals = Refusals()
+        with widgets.section("Settings of the scene") as is_open:
+            if is_open:
+                settings = render.draw_settings(editor.scene.settings, refusals)
+                if settings is not editor.scene.settings:
+                    editor.propose(replace(editor.scene, settings=settings), "Render settings", _key())
+        widgets.show_refusals(refusals)
+
+    def _draw_method(self, editor: Editor) -> None:
+        with widgets.section("Display") as is_open:
+            if is_open:
+                display = display_panel.draw(editor.preferences.display, list(OVERLAY_NAMES.items()))
+                editor.change_display(display)
+        with widgets.section("Measurements") as is_open:
+            if is_open:
+                if editor.frame is not None:
+                    self.records.add(editor.frame, editor.now())
+                with widgets.row(
+                    "Reference", "Errors are measured against the picture as it was when pinned"
+                ):
+                    label = "Unpin" if editor.is_pinned else "Pin this picture"
+                    if widgets.button(label, enabled=editor.frame is not None):
+                        actions.pin(editor)
+                plots.draw(self.records, editor.preferences.step_ms)
+
+
+def _lay_out(root: int) -> None:
+    builder = imgui.internal
+    builder.dock_builder_remove_node(root)
+    builder.dock_builder_add_node(root, builder.DockNodeFlagsPrivate_.dock_space)
+    builder.dock_builder_set_node_size(root, imgui.get_main_viewport().work_size)
+    _, right, _ = builder.dock_builder_split_node_py(root, imgui.Dir.right, _RIGHT_SHARE)
+    _, top, bottom = builder.dock_builder_split_node_py(right, imgui.Dir.up, _OUTLINER_SHARE)
+    builder.dock_builder_dock_window("Outliner", top)
+    for name in ("Object", "Scene", "Render", "Method"):
+        builder.dock_builder_dock_window(name, bottom)
+    builder.dock_builder_finish(root)
+
+
+def _key() -> str:
+    """What the edits of one drag or one typing have in common: the widget that is active."""
+    return f"widget {imgui.internal.get_active_id()}"
+
+
+def _with_object(scene: Scene, name: str, new: Object) -> Scene:
+    return replace(scene, objects=tuple(new if o.name == name else o for o in scene.objects))
+
+
+def _apply_material_outcome(editor: Editor, material: str, outcome: material_panel.Outcome) -> None:
+    if outcome.assign is not None:
+        scene = objects.assign_material(editor.scene, editor.selection.names, outcome.assign)
+        editor.propose(scene, "Assign material")
+    if outcome.is_new:
+        actions.new_material(editor)
+    if outcome.is_duplicate:
+        actions.duplicate_material(editor, material)
+    if outcome.is_delete:
+        editor.propose(objects.delete_material(editor.scene, material), "Delete material")
+    if outcome.is_rename:
+        actions.rename_material(editor, material)
