@@ -72,9 +72,9 @@ def tone_map(linear: npt.ArrayLike, exposure: float = 0.0, curve: str = "agx") -
     if radiance.shape[-1:] != (3,):
         raise InputError(f"image: has shape {radiance.shape}; a picture has shape (height, width, 3)")
     undefined = np.isnan(radiance).any(axis=-1)
-    scaled = np.clip(np.nan_to_num(radiance, posinf=1e30) * 2.0**exposure, 0.0, 1e30)
+    scaled = np.clip(np.nan_to_num(radiance, posinf=1e30, neginf=0.0) * 2.0**exposure, 0.0, 1e30)
     encoded = {"agx": _agx, "filmic": _filmic, "srgb": _srgb}[curve](scaled)
-    result = np.rint(np.clip(encoded, 0.0, 1.0) * 255.0).astype(np.uint8)
+    result: npt.NDArray[np.uint8] = np.rint(np.clip(encoded, 0.0, 1.0) * 255.0).astype(np.uint8)
     result[undefined] = UNDEFINED_PIXEL
     return result
 

@@ -5,18 +5,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import moderngl
 import numpy as np
+import numpy.typing as npt
 
 from incpt import image_io
 from incpt.ui import overlays
-from incpt.ui.outline import FULL_SCREEN, Outline, Outlined, Rect, inside, viewport_of
+from incpt.ui.outline import FULL_SCREEN, OVER, Outline, Outlined, Rect, inside, viewport_of
 
 if TYPE_CHECKING:
     from incpt.live import Picture
     from incpt.session import Aovs
+    from incpt.tiles import TileGrid
     from incpt.ui.overlays import Overlay
     from incpt.ui.preferences import DisplaySettings
 
@@ -102,17 +104,34 @@ void main() {{
 
 _SHADER_CURVES = {"agx": 0, "filmic": 1, "srgb": 2}
 
+# The mean brightness of each tile, from 16 places in it.
+_TILE_LUMA = """#version 330 core
+uniform sampler2D mapped;
+uniform vec2 tile_units;
+out float luma;
+void main() {
+    vec2 corner = floor(gl_FragCoord.xy) * tile_units;
+    luma = 0.0;
+    for (int y = 0; y < 4; y++)
+        for (int x = 0; x < 4; x++) {
+            vec2 place = corner + (vec2(x, y) + 0.5) / 4.0 * tile_units;
+            luma += dot(textureLod(mapped, place, 0.0).rgb, vec3(0.2126, 0.7152, 0.0722)) / 16.0;
+        }
+}
+"""
+
 # Positions count from the top left, as in the image; `rect` is where the image lies in the framebuffer.
 _COMPOSE = """#version 330 core
 uniform sampler2D mapped;
 uniform sampler2D overlay;
+uniform sampler2D tile_luma;
 uniform float opacity;
+uniform vec2 image_size;
 uniform vec2 overlay_extent;
 uniform vec4 rect;
 uniform float framebuffer_height;
 uniform bool nearest;
 uniform float tile_size;
-uniform vec2 grid_scale;
 uniform float grid_strength;
 out vec4 result;
 
@@ -123,25 +142,33 @@ bool on_line(float at, float origin, float step, float extent) {
     return line >= 1.0 && place < extent - 0.5 && floor(origin + place + 0.01) == floor(at);
 }
 
+// Light on dark tiles, dark on bright ones: by pixel, lines would break up into dots on a noisy picture.
+vec3 with_grid(vec3 color, vec2 at, vec2 place) {
+    vec2 step = tile_size * rect.zw / image_size;
+    bool vertical = on_line(at.x, rect.x, step.x, rect.z);
+    if (!vertical && !on_line(at.y, rect.y, step.y, rect.w))
+        return color;
+    vec2 tile = place / tile_size;
+    ivec2 after = ivec2(vertical ? vec2(round(tile.x), tile.y) : vec2(tile.x, round(tile.y)));
+    ivec2 before = after - (vertical ? ivec2(1, 0) : ivec2(0, 1));
+    float luma = texelFetch(tile_luma, before, 0).r + texelFetch(tile_luma, after, 0).r;
+    return mix(color, vec3(luma < 1.0 ? 1.0 : 0.0), grid_strength);
+}
+
 void main() {
     vec2 at = vec2(gl_FragCoord.x, framebuffer_height - gl_FragCoord.y);
     vec2 unit = (at - rect.xy) / rect.zw;
     if (any(lessThan(unit, vec2(0.0))) || any(greaterThanEqual(unit, vec2(1.0))))
         discard;
-    vec2 size = vec2(textureSize(mapped, 0));
-    vec3 color = nearest ? texelFetch(mapped, ivec2(unit * size), 0).rgb : texture(mapped, unit).rgb;
+    vec2 place = unit * image_size;
+    vec2 texels = vec2(textureSize(mapped, 0));
+    vec3 color = nearest ? texelFetch(mapped, ivec2(unit * texels), 0).rgb : texture(mapped, unit).rgb;
     if (opacity > 0.0) {
-        vec2 texel = unit * size / overlay_extent * vec2(textureSize(overlay, 0));
-        vec4 over = texelFetch(overlay, ivec2(texel), 0);
+        vec4 over = texelFetch(overlay, ivec2(place / overlay_extent * vec2(textureSize(overlay, 0))), 0);
         color = mix(color, over.rgb, over.a * opacity);
     }
-    if (grid_strength > 0.0) {
-        vec2 step = tile_size * grid_scale;
-        if (on_line(at.x, rect.x, step.x, rect.z) || on_line(at.y, rect.y, step.y, rect.w)) {
-            float luma = dot(color, vec3(0.2126, 0.7152, 0.0722));
-            color = mix(color, vec3(luma < 0.5 ? 1.0 : 0.0), grid_strength);
-        }
-    }
+    if (grid_strength > 0.0)
+        color = with_grid(color, at, place);
     result = vec4(color, 1.0);
 }
 """
@@ -184,21 +211,26 @@ class _Side:
         self.mapped: moderngl.Texture | None = None
         self.target: moderngl.Framebuffer | None = None
         self.mapped_with: tuple[float, str] | None = None
+        self.tile_luma: moderngl.Texture | None = None
+        self.tile_luma_target: moderngl.Framebuffer | None = None
+        self.tile_luma_of: TileGrid | None = None
         self.overlay: Overlay | None = None
         self.overlay_texture: moderngl.Texture | None = None
-        self.overlay_of: tuple[str, Picture, Aovs | None] | None = None
+        self.overlay_of: tuple[str, tuple[int, ...]] | None = None
+        self.overlay_source: Picture | Aovs | None = None
 
     def upload(self, picture: Picture) -> None:
         old = self.picture
         self.picture = picture
         if old is not None and old.image is picture.image:
             return
-        height, width = picture.image.shape[:2]
+        image = self._fitting(picture.image)
+        height, width = image.shape[:2]
         if self.radiance is None or self.radiance.size != (width, height):
             self._resize(width, height, old)
         assert self.radiance is not None
-        self.radiance.write(np.ascontiguousarray(picture.image, np.float32))
-        self.mapped_with = None
+        self.radiance.write(np.ascontiguousarray(image, np.float32))
+        self.mapped_with = self.tile_luma_of = None
         if self.underlay is not None and _is_complete(picture):
             self.underlay.release()
             self.underlay = None
@@ -223,22 +255,47 @@ class _Side:
     def lay_over(self, kind: str, aovs: Aovs | None) -> None:
         """Makes the overlay texture that of `kind`, unless it is there already."""
         assert self.picture is not None
-        key = (kind, self.picture, aovs)
-        if self.overlay_of is not None and all(a is b for a, b in zip(key, self.overlay_of, strict=True)):
+        source = aovs if kind in overlays.NEEDS_AOVS else self.picture
+        if self.overlay_of == (kind, self.picture.image.shape) and self.overlay_source is source:
             return
         self.overlay = overlays.build(kind, self.picture, aovs)
-        self.overlay_of = key
+        self.overlay_of, self.overlay_source = (kind, self.picture.image.shape), source
         if self.overlay is None:
             return
-        height, width = self.overlay.image.shape[:2]
+        image = self._fitting(self.overlay.image)
+        height, width = image.shape[:2]
         if self.overlay_texture is None or self.overlay_texture.size != (width, height):
             if self.overlay_texture is not None:
                 self.overlay_texture.release()
             self.overlay_texture = self._context.texture((width, height), 4)
-        self.overlay_texture.write(np.ascontiguousarray(self.overlay.image))
+        self.overlay_texture.write(np.ascontiguousarray(image))
+
+    def make_tile_luma(self, size: tuple[int, int]) -> moderngl.Framebuffer:
+        """The target for one brightness a tile, of a grid of columns and rows."""
+        if self.tile_luma is None or self.tile_luma_target is None or self.tile_luma.size != size:
+            for resource in (self.tile_luma, self.tile_luma_target):
+                if resource is not None:
+                    resource.release()
+            self.tile_luma = self._context.texture(size, 1)
+            self.tile_luma_target = self._context.framebuffer([self.tile_luma])
+        return self.tile_luma_target
+
+    def _fitting(self, image: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Every n-th pixel of an image that is larger than a texture may be."""
+        limit = int(self._context.info["GL_MAX_TEXTURE_SIZE"])
+        n = -(-max(image.shape[:2]) // limit)
+        return image[::n, ::n]
 
     def release(self) -> None:
-        for resource in (self.radiance, self.underlay, self.mapped, self.target, self.overlay_texture):
+        for resource in (
+            self.radiance,
+            self.underlay,
+            self.mapped,
+            self.target,
+            self.tile_luma,
+            self.tile_luma_target,
+            self.overlay_texture,
+        ):
             if resource is not None:
                 resource.release()
 
@@ -251,9 +308,10 @@ class Display:
         self._tone_map = context.program(vertex_shader=FULL_SCREEN, fragment_shader=_TONE_MAP)
         self._compose = context.program(vertex_shader=FULL_SCREEN, fragment_shader=_COMPOSE)
         self._bar = context.program(vertex_shader=FULL_SCREEN, fragment_shader=_BAR)
-        self._programs = (self._tone_map, self._compose, self._bar)
+        self._tile_luma = context.program(vertex_shader=FULL_SCREEN, fragment_shader=_TILE_LUMA)
+        self._programs = (self._tone_map, self._compose, self._bar, self._tile_luma)
         self._arrays = {p: context.vertex_array(p, []) for p in self._programs}
-        self._outline = Outline(context)
+        self.outline = Outline(context)
         self._sides: list[_Side] = []
         self._aovs: Aovs | None = None
         self.background = (0.11, 0.11, 0.115)
@@ -321,6 +379,8 @@ class Display:
             ]
         for side, _ in shown:
             self._map(side, settings)
+            if settings.tile_grid:
+                self._measure_tiles(side)
             side.lay_over(settings.overlay, self._aovs)
         target.use()
         context.scissor = None
@@ -331,7 +391,7 @@ class Display:
             picture = self._sides[-1].picture
             assert picture is not None
             height, width = picture.image.shape[:2]
-            self._outline.draw(target, area, rect_px, framebuffer_size[1], selection, width / height, scale)
+            self.outline.draw(target, area, rect_px, framebuffer_size[1], selection, width / height, scale)
         if split:
             self._draw_bar(bar_x, area, rect_px, framebuffer_size[1], scale)
         context.enable_only(moderngl.NOTHING)
@@ -340,7 +400,7 @@ class Display:
     def release(self) -> None:
         """Give all GL objects back."""
         self.forget()
-        self._outline.release()
+        self.outline.release()
         for array in self._arrays.values():
             array.release()
         for program in self._programs:
@@ -363,6 +423,20 @@ class Display:
         self._context.scissor = None
         self._arrays[program].render(moderngl.TRIANGLES, vertices=3)
         side.mapped_with = wanted
+        side.tile_luma_of = None
+
+    def _measure_tiles(self, side: _Side) -> None:
+        assert side.picture is not None and side.mapped is not None
+        grid, limit = side.picture.grid, self._context.info["GL_MAX_TEXTURE_SIZE"]
+        if side.tile_luma_of == grid or max(grid.columns, grid.rows) > limit:
+            return
+        program = self._tile_luma
+        program["mapped"] = 0
+        program["tile_units"] = (grid.tile_size / grid.width, grid.tile_size / grid.height)
+        side.mapped.use(0)
+        side.make_tile_luma((grid.columns, grid.rows)).use()
+        self._arrays[program].render(moderngl.TRIANGLES, vertices=3)
+        side.tile_luma_of = grid
 
     def _draw_side(
         self,
@@ -373,22 +447,22 @@ class Display:
         framebuffer_height: int,
     ) -> None:
         assert side.mapped is not None and side.picture is not None
-        width, height = side.mapped.size
-        grid_scale = (rect_px[2] / width, rect_px[3] / height)
-        magnified = min(grid_scale)
+        height, width = side.picture.image.shape[:2]
+        magnified = min(rect_px[2] / width, rect_px[3] / height)
         tile_size = side.picture.grid.tile_size
         program = self._compose
         program["rect"] = tuple(map(float, rect_px))
         program["framebuffer_height"] = float(framebuffer_height)
         program["nearest"] = magnified >= NEAREST_FROM
         program["tile_size"] = float(tile_size)
-        program["grid_scale"] = grid_scale
+        program["image_size"] = (float(width), float(height))
         program["grid_strength"] = _grid_strength(tile_size * magnified) if settings.tile_grid else 0.0
         program["opacity"] = settings.overlay_opacity if side.overlay is not None else 0.0
         program["overlay_extent"] = tuple(map(float, side.overlay.extent_px)) if side.overlay else (1.0, 1.0)
-        program["mapped"], program["overlay"] = 0, 1
+        program["mapped"], program["overlay"], program["tile_luma"] = 0, 1, 2
         side.mapped.use(0)
         (side.overlay_texture or side.mapped).use(1)
+        (side.tile_luma or side.mapped).use(2)
         self._context.viewport = viewport_of(part, framebuffer_height)
         self._arrays[program].render(moderngl.TRIANGLES, vertices=3)
 
@@ -413,7 +487,7 @@ class Display:
         program["rim"] = max(scale, 1.0)
         program["framebuffer_height"] = float(framebuffer_height)
         self._context.enable(moderngl.BLEND)
-        self._context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
+        self._context.blend_func = OVER  # type: ignore[assignment]  # takes four as well
         self._context.viewport = viewport_of(part, framebuffer_height)
         self._arrays[program].render(moderngl.TRIANGLES, vertices=3)
 
@@ -424,7 +498,7 @@ def split_x(rect_px: Rect, position: float) -> float:
 
 
 def _grid_strength(tile_px: float) -> float:
-    return 0.4 * min(max((tile_px - GRID_MIN_PX) / (GRID_FULL_PX - GRID_MIN_PX), 0.0), 1.0)
+    return 0.35 * min(max((tile_px - GRID_MIN_PX) / (GRID_FULL_PX - GRID_MIN_PX), 0.0), 1.0)
 
 
 def _is_complete(picture: Picture) -> bool:

@@ -160,7 +160,8 @@ def _depth(aovs: Aovs) -> tuple[Pixels, tuple[tuple[str, Color], ...]]:
     near, far = np.maximum(np.percentile(aovs.depth[hit], _DEPTH_PERCENTILES), 1e-6)
     far = max(far, near * 1.01)
     depth = np.clip(np.where(hit, aovs.depth, far), near, far)
-    rgb = color_map(VIRIDIS, 1.0 - _log_place(depth, near, far))
+    shades = color_map(VIRIDIS, np.linspace(1.0, 0.0, 256))
+    rgb = shades[np.rint(_log_place(depth, near, far) * 255.0).astype(np.uint8)]
     steps = [(f"{d:.3g} m", 1.0 - float(_log_place(d, near, far))) for d in np.geomspace(near, far, 5)]
     return _of_hits(aovs, rgb), _legend(VIRIDIS, steps)
 
@@ -209,6 +210,10 @@ def _linear_from_oklab(
 
 
 def _srgb8(linear: npt.ArrayLike) -> Pixels:
-    x = np.clip(np.asarray(linear, np.float32), 0.0, 1.0)
-    encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** np.float32(1 / 2.4) - 0.055)
-    return np.rint(encoded * 255.0).astype(np.uint8)
+    steps = 1 << 14
+    x = np.arange(steps) / (steps - 1)
+    encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+    table = np.rint(encoded * 255.0).astype(np.uint8)
+    place = np.clip(np.asarray(linear, np.float32), 0.0, 1.0) * np.float32(steps - 1)
+    result: Pixels = table[np.rint(place).astype(np.int16)]
+    return result
