@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from incpt.ui.document import Document, collected_warnings, new_scene, scene_path
 
 from incpt import scene_io
 from incpt.errors import InputError, InputWarning, OutputError
 from incpt.scene import Mesh, Scene, diff
+from incpt.ui.document import Document, collected_warnings, new_scene, scene_path
 
 
 def edit(document: Document, x: float) -> None:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
-from incpt.ui.history import MAX_ENTRIES, History
 
 from incpt.scene import Material, Object, Scene, shape
+from incpt.ui.history import MAX_ENTRIES, History
 
 START = Scene(materials={"grey": Material()}, objects=(Object("cube", shape("cube"), "grey"),))
 

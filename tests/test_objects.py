@@ -10,13 +10,13 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from incpt.ui import objects
-from incpt.ui.objects import FileKind
 
 from incpt import transform
 from incpt.errors import InputError
 from incpt.image_io import write_exr
 from incpt.scene import SHAPES, Camera, Environment, Material, Object, Scene, diff, shape
+from incpt.ui import objects
+from incpt.ui.objects import FileKind
 
 SCENE = Scene(
     camera=Camera(target=(1.0, 0.4, -2.0)),

@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from incpt.ui import preferences as stored
-from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
 
 from incpt.errors import InputError, OutputError
+from incpt.ui import preferences as stored
+from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
 
 
 @pytest.fixture(autouse=True)
@@ -190,6 +190,12 @@ def test_recent_files_are_unique_latest_first_at_most_ten_and_there(tmp_path: Pa
 def test_recent_paths_are_absolute(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert Preferences().with_recent("a.toml").recent == (os.path.join(tmp_path, "a.toml"),)
+
+
+def test_the_size_of_a_minimised_window_is_not_remembered() -> None:
+    preferences = Preferences().with_window_size(800, 600)
+    assert preferences.window_size == (800, 600)
+    assert preferences.with_window_size(0, 0) is preferences
 
 
 def test_the_layout_is_kept_in_the_same_folder(folder: Path) -> None:

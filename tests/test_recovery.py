@@ -15,7 +15,7 @@ from incpt.image_io import write_exr
 from incpt.scene import Mesh, Scene
 from incpt.ui import objects
 from incpt.ui.document import Document
-from incpt.ui.recovery import LeftBehind, Recovery, discard, find_left_behind, recovery_folder
+from incpt.ui.recovery import LeftBehind, Recovery, find_left_behind, recovery_folder
 
 EDITOR = """
 import sys
@@ -79,7 +79,7 @@ def test_only_changes_are_written_and_not_too_often(folder: Path) -> None:
     assert recovery.update(document, 200)
     edit(document, 4)
     assert not recovery.update(document, 229) and recovery.update(document, 230)
-    recovery.close()
+    recovery.remove()
 
 
 def test_a_drag_under_way_is_not_written(folder: Path) -> None:
@@ -89,7 +89,7 @@ def test_a_drag_under_way_is_not_written(folder: Path) -> None:
     assert not recovery.update(document, 5)
     document.history.settle()
     assert recovery.update(document, 5)
-    recovery.close()
+    recovery.remove()
 
 
 def test_saving_removes_the_recovery_file(folder: Path, tmp_path: Path) -> None:
@@ -101,7 +101,7 @@ def test_saving_removes_the_recovery_file(folder: Path, tmp_path: Path) -> None:
     assert recovery.path is None and not list(folder.glob("*.toml"))
     edit(document, 2)
     assert recovery.update(document, 2) and len(list(folder.glob("*.toml"))) == 1
-    recovery.close()
+    recovery.remove()
 
 
 def test_a_clean_end_leaves_nothing(folder: Path) -> None:
@@ -109,10 +109,10 @@ def test_a_clean_end_leaves_nothing(folder: Path) -> None:
     mesh = Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32))
     document.history.propose(document.scene.with_object("cube", mesh=mesh), "Mesh")
     assert recovery.update(document, 0) and len(list(folder.iterdir())) == 3
-    recovery.close()
+    recovery.remove()
     assert not list(folder.iterdir())
-    recovery.close()
-    Recovery(0, folder).close()
+    recovery.remove()
+    Recovery(0, folder).remove()
 
 
 def test_a_running_editor_is_not_found(folder: Path) -> None:
@@ -121,7 +121,7 @@ def test_a_running_editor_is_not_found(folder: Path) -> None:
     edit(document, 1)
     recovery.update(document, 0)
     assert find_left_behind(folder) == []
-    recovery.close()
+    recovery.remove()
 
 
 def test_a_folder_that_cannot_be_written_is_told_again_only_later(tmp_path: Path) -> None:
@@ -134,7 +134,7 @@ def test_a_folder_that_cannot_be_written_is_told_again_only_later(tmp_path: Path
     assert not recovery.update(document, 19.9)
     with pytest.raises(OutputError):
         recovery.update(document, 20)
-    recovery.close()
+    recovery.remove()
 
 
 def killed_editor(scene: Path, folder: Path) -> int:
@@ -158,7 +158,8 @@ def test_what_a_killed_editor_leaves_is_found_and_recovered(folder: Path, tmp_pa
     pid = killed_editor(scene, folder)
     (left,) = find_left_behind(folder)
     assert left.original == scene and left.name == "scene.toml" and left.path.name.startswith(f"{pid}-")
-    assert left.time == pytest.approx(left.path.stat().st_mtime)
+    assert left.time == left.path.stat().st_mtime and left.saved_at.startswith("20")
+    assert left.open().scene.object("tri").position == (1, 2, 3) and left.path.exists()
 
     recovery = Recovery(30, folder)
     document = recovery.recover(left)
@@ -169,14 +170,14 @@ def test_what_a_killed_editor_leaves_is_found_and_recovered(folder: Path, tmp_pa
 
     document.save()
     recovery.update(document, 1)
-    recovery.close()
+    recovery.remove()
     assert Document.open(scene).scene == document.scene and not list(folder.iterdir())
 
 
 def test_what_is_left_may_be_discarded(folder: Path, tmp_path: Path) -> None:
     killed_editor(project(tmp_path), folder)
     (left,) = find_left_behind(folder)
-    discard(left)
+    left.remove()
     assert find_left_behind(folder) == [] and not list(folder.iterdir())
 
 
@@ -192,7 +193,7 @@ def test_a_damaged_file_is_found_but_stays_when_it_cannot_be_read(folder: Path) 
     with pytest.raises(InputError):
         recovery.recover(left)
     assert left.path.exists() and not (folder / "2-b.lock").exists()
-    recovery.close()
+    recovery.remove()
 
 
 def test_the_folder_is_the_users_or_the_chosen_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

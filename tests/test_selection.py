@@ -2,9 +2,9 @@ from __future__ import annotations
 
 from hypothesis import given
 from hypothesis import strategies as st
-from incpt.ui.selection import Selection
 
 from incpt.scene import Material, Object, Scene, shape
+from incpt.ui.selection import Selection
 
 names = st.text("abc", min_size=1, max_size=2)
 selections = st.lists(names).map(lambda chosen: Selection(tuple(chosen)))

@@ -9,11 +9,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from incpt.ui.history import History
-
 from incpt import mesh_io, scene_io
 from incpt.errors import InputError, InputWarning, one_line
 from incpt.scene import Camera, Environment, Material, Object, Scene, shape
+from incpt.ui.history import History
 
 SUFFIX = ".toml"
 UNTITLED = "untitled"

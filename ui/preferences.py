@@ -157,6 +157,14 @@ class Preferences(_Group):
         latest = os.path.abspath(path)
         return replace(self, recent=(latest, *self.recent))
 
+    def with_window_size(self, width: int, height: int) -> Preferences:
+        """Preferences with the size of the window; one that is out of range, as a minimised window has,
+        is not remembered."""
+        low, high = RANGES["window_size"]
+        if not low <= min(width, height) <= max(width, height) <= high:
+            return self
+        return replace(self, window_size=(width, height))
+
     @property
     def recent_files(self) -> tuple[Path, ...]:
         """The recent files that are still there, the latest first."""

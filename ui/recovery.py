@@ -14,6 +14,7 @@ import os
 import sys
 import tempfile
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import IO
 
@@ -22,7 +23,7 @@ import platformdirs
 from incpt import files, scene_io
 from incpt.errors import InputError, OutputError, one_line
 from incpt.scene import Scene
-from incpt.ui.document import Document, collected_warnings
+from incpt.ui.document import UNTITLED, Document, collected_warnings
 from incpt.ui.preferences import CONFIG_DIR
 
 _ORIGINAL = "# original: "
@@ -41,7 +42,24 @@ class LeftBehind:
     @property
     def name(self) -> str:
         """What the scene was called."""
-        return "untitled" if self.original is None else self.original.name
+        return UNTITLED if self.original is None else self.original.name
+
+    @property
+    def saved_at(self) -> str:
+        """The time as local text."""
+        return datetime.fromtimestamp(self.time).strftime("%Y-%m-%d %H:%M")
+
+    def open(self) -> Document:
+        """The document as it was, unsaved, to be saved where it came from. The file stays. Raises
+        InputError."""
+        with collected_warnings() as messages:
+            scene = scene_io.load(self.path)
+        return Document(scene, self.original, name=self.name, warnings=tuple(messages), is_saved=False)
+
+    def remove(self) -> None:
+        """Removes the recovery file and what was written beside it: nobody wants it."""
+        _remove(self.path)
+        self.path.with_suffix(_LOCK).unlink(missing_ok=True)
 
 
 class Recovery:
@@ -99,7 +117,7 @@ class Recovery:
             _remove(self._path)
         self._kept = None
 
-    def close(self) -> None:
+    def remove(self) -> None:
         """At the end of the editor: removes every trace of it."""
         self.clear()
         if self._lock is not None and self._path is not None:
@@ -108,13 +126,11 @@ class Recovery:
         self._lock = self._path = None
 
     def recover(self, left: LeftBehind) -> Document:
-        """The document that a crash left behind, to be saved where it came from. It is kept under this
-        editor's own name before the old file goes. Raises InputError and OutputError; then it stays."""
-        with collected_warnings() as messages:
-            scene = scene_io.load(left.path)
-        document = Document(scene, left.original, name=left.name, warnings=tuple(messages), is_saved=False)
-        self.write(scene, left.original)
-        discard(left)
+        """Opens what a crash left behind, and keeps it under this editor's own name before the old file
+        goes: another crash loses nothing. Raises InputError and OutputError; then the old file stays."""
+        document = left.open()
+        self.write(document.scene, document.path)
+        left.remove()
         return document
 
     def _claim(self) -> Path:
@@ -161,12 +177,6 @@ def find_left_behind(folder: Path | None = None) -> list[LeftBehind]:
         except (OSError, InputError):
             continue
     return sorted(found, key=lambda left: left.time, reverse=True)
-
-
-def discard(left: LeftBehind) -> None:
-    """Removes a recovery file and what was written beside it."""
-    _remove(left.path)
-    left.path.with_suffix(_LOCK).unlink(missing_ok=True)
 
 
 def _remove(path: Path) -> None:
