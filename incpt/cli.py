@@ -131,7 +131,7 @@ def _root(
     ] = False,
 ) -> None:
     if context.invoked_subcommand is None:
-        raise typer.Exit(_enter("incpt.ui.app", "the editor", []))
+        raise typer.Exit(_enter("incpt.ui.app", "the editor", None, None))
 
 
 # ------------------------------------------------------------------------------------------ commands
@@ -140,10 +140,15 @@ _EXTRAS = {"ui": "ui", "benchmarks": "bench"}
 _PASS_ON = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
 
 
-@app.command(context_settings=_PASS_ON)
-def edit(context: typer.Context) -> None:
-    """The editor: incpt edit [SCENE|MESH]."""
-    raise typer.Exit(_enter("incpt.ui.app", "the editor", context.args))
+@app.command()
+def edit(
+    file: Annotated[
+        Path | None, typer.Argument(help="Scene file or mesh.", show_default="an example")
+    ] = None,
+    device: DeviceOption = None,
+) -> None:
+    """The editor: select and drag things, and see the change at once."""
+    raise typer.Exit(_enter("incpt.ui.app", "the editor", file, device))
 
 
 @app.command(context_settings=_PASS_ON)
@@ -152,8 +157,8 @@ def bench(context: typer.Context) -> None:
     raise typer.Exit(_enter("incpt.benchmarks.main", "the benchmarks", context.args))
 
 
-def _enter(module_name: str, what: str, arguments: list[str]) -> int:
-    """Call `main(arguments)` of a part that incpt does not import until it is asked for."""
+def _enter(module_name: str, what: str, *arguments: Any) -> int:
+    """Call `main` of a part that incpt does not import until it is asked for."""
     try:
         module = importlib.import_module(module_name)
     except ModuleNotFoundError as error:
@@ -162,7 +167,9 @@ def _enter(module_name: str, what: str, arguments: list[str]) -> int:
             return _complain(f"{what}: not in this version; it comes with a later one", 1)
         extra = _EXTRAS[module_name.split(".")[1]]
         return _complain(f'{what}: {missing} is not installed; run pip install "incpt[{extra}]"', 1)
-    return int(module.main(arguments))
+    except ImportError as error:
+        return _complain(f"{what}: {error}; install that library of the system (OpenGL: libgl1)", 1)
+    return int(module.main(*arguments))
 
 
 @app.command()

@@ -327,21 +327,33 @@ def test_it_runs_as_a_module() -> None:
 @pytest.mark.parametrize(
     ("arguments", "module", "passed_on"),
     [
-        ([], "incpt.ui.app", []),
-        (["edit"], "incpt.ui.app", []),
-        (["edit", "a.toml", "--device", "0"], "incpt.ui.app", ["a.toml", "--device", "0"]),
-        (["bench", "rays", "-h"], "incpt.benchmarks.main", ["rays", "-h"]),
+        ([], "incpt.ui.app", (None, None)),
+        (["edit"], "incpt.ui.app", (None, None)),
+        (["edit", "a.toml", "--device", "0"], "incpt.ui.app", (Path("a.toml"), "0")),
+        (["bench", "rays", "-h"], "incpt.benchmarks.main", (["rays", "-h"],)),
     ],
 )
 def test_editor_and_benchmarks_are_entered(
-    monkeypatch: pytest.MonkeyPatch, arguments: list[str], module: str, passed_on: list[str]
+    monkeypatch: pytest.MonkeyPatch, arguments: list[str], module: str, passed_on: tuple[Any, ...]
 ) -> None:
     received: list[Any] = []
     fake = types.ModuleType(module)
-    fake.main = lambda given: received.append(given) or 5  # type: ignore[attr-defined]
+    fake.main = lambda *given: received.append(given) or 5  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, module, fake)
     assert main(arguments) == 5
     assert received == [passed_on]
+
+
+def test_an_editor_without_a_library_of_the_system(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def find(name: str) -> None:
+        raise ImportError("libGL.so.1: cannot open shared object file: No such file or directory")
+
+    monkeypatch.setattr(importlib, "import_module", find)
+    assert main(["edit"]) == 1
+    line = only_line(capsys.readouterr().err)
+    assert "libGL.so.1" in line and "libgl1" in line
 
 
 @pytest.mark.parametrize(

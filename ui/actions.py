@@ -12,7 +12,7 @@ from incpt.errors import InputError
 from incpt.scene import Object
 from incpt.ui import camera_moves, clipboard, objects
 from incpt.ui.dialogs import About, Choice, PathDialog, Question, TextField
-from incpt.ui.document import Document
+from incpt.ui.document import Document, collected_warnings
 from incpt.ui.editor import Editor
 from incpt.ui.renderer import Export, Pin, Restart
 from incpt.ui.selection import Selection
@@ -82,7 +82,10 @@ def drop(editor: Editor, path: Path) -> None:
     if objects.file_kind(path) is objects.FileKind.SCENE:
         open_file(editor, path)
         return
-    scene, names = objects.drop_file(editor.scene, path)
+    with collected_warnings() as warnings:
+        scene, names = objects.drop_file(editor.scene, path)
+    for warning in warnings:
+        editor.messages.add(warning, "warning")
     selection = Selection(names) if names else editor.selection
     editor.propose(scene, f"Add {path.name}", selection=selection)
 

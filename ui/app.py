@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
-import os
 import time
-from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -97,7 +93,7 @@ class App:
         """Stop the renderer, keep the preferences, close the window."""
         self.renderer.close()
         self.recovery.close()
-        self.editor.preferences = replace(self.editor.preferences, window_size=self.window.size)
+        self.editor.preferences = self.editor.preferences.with_window_size(*self.window.size)
         self._keep_preferences()
         self.display.release()
         implot.destroy_context()
@@ -150,20 +146,9 @@ class App:
         self.editor.start_over(self.recovery.recover(found))
 
 
-def main(arguments: Sequence[str]) -> int:
-    """`incpt edit [SCENE|MESH] [--device NAME]`; returns the exit status."""
-    options = _parse(arguments)
-    path = options.file.expanduser() if options.file is not None else None
-    document = Document.example() if path is None else Document.open(path)
-    App(document, options.device, path).run()
+def main(file: Path | None, device: str | None) -> int:
+    """The editor on a scene file or a mesh, by default on an example; returns the exit status. Raises
+    InputError for a file or a device that is not there, DeviceError where no window opens."""
+    document = Document.example() if file is None else Document.open(file)
+    App(document, device, file).run()
     return 0
-
-
-def _parse(arguments: Sequence[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog="incpt edit", description="Edit a scene under its path-traced picture."
-    )
-    parser.add_argument("file", nargs="?", type=Path, help="scene file or mesh (default: an example)")
-    parser.add_argument("--device", default=os.environ.get("INCPT_DEVICE"),
-                        help="index or part of the name, as `incpt devices` lists them")  # fmt: skip
-    return parser.parse_args(arguments)
