@@ -135,7 +135,8 @@ def test_pixels_keep_their_places_and_clipping_holds(screen: Any) -> None:
     outside = np.ones(shown.shape[:2], bool)
     outside[20:28, 10:40] = False
     assert (shown[outside] == CLEAR).all()
-    assert (window.draw((100, 0, 80, 40)) == CLEAR).all()
+    for nowhere in ((100, 0, 80, 40), (3.5, 3.5, 0, 9), (0, 0, 9, float("nan"))):
+        assert (window.draw(nowhere) == CLEAR).all()
 
 
 def test_far_magnification_shows_the_right_pixel(screen: Any) -> None:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from incpt import image_io
 from incpt.ui import overlays
-from incpt.ui.outline import FULL_SCREEN, OVER, Outline, Outlined, Rect, inside, viewport_of
+from incpt.ui.outline import FULL_SCREEN, OVER, Outline, Outlined, PixelRect, Rect, inside, viewport_of
 
 if TYPE_CHECKING:
     from incpt.live import Picture
@@ -219,6 +219,13 @@ class _Side:
         self.overlay_of: tuple[str, tuple[int, ...]] | None = None
         self.overlay_source: Picture | Aovs | None = None
 
+    @property
+    def aspect(self) -> float:
+        """Width over height."""
+        assert self.picture is not None
+        height, width = self.picture.image.shape[:2]
+        return float(width / height)
+
     def upload(self, picture: Picture) -> None:
         old = self.picture
         self.picture = picture
@@ -364,19 +371,12 @@ class Display:
         area = inside(rect_px, clip_px, framebuffer_size)
         if not self._sides or area is None:
             return
-        context = self._context
-        target = context.fbo
+        context, target, height = self._context, self._context.fbo, framebuffer_size[1]
         context.enable_only(moderngl.NOTHING)
-        split = settings.split and len(self._sides) == 2
-        bar_x = split_x(rect_px, settings.split_position)
-        shown = [(self._sides[-1], area)]
-        if split:
-            x, y, width, height = area
-            cut = min(max(round(bar_x), x), x + width)
-            shown = [
-                (self._sides[0], (x, y, cut - x, height)),
-                (self._sides[1], (cut, y, x + width - cut, height)),
-            ]
+        bar_x = (
+            split_x(rect_px, settings.split_position) if settings.split and len(self._sides) == 2 else None
+        )
+        shown = self._shown(area, bar_x)
         for side, _ in shown:
             self._map(side, settings)
             if settings.tile_grid:
@@ -385,15 +385,11 @@ class Display:
         target.use()
         context.scissor = None
         for side, part in shown:
-            if part[2] > 0:
-                self._draw_side(side, part, rect_px, settings, framebuffer_size[1])
+            self._draw_side(side, part, rect_px, settings, height)
         if settings.outline and selection is not None:
-            picture = self._sides[-1].picture
-            assert picture is not None
-            height, width = picture.image.shape[:2]
-            self.outline.draw(target, area, rect_px, framebuffer_size[1], selection, width / height, scale)
-        if split:
-            self._draw_bar(bar_x, area, rect_px, framebuffer_size[1], scale)
+            self.outline.draw(target, area, rect_px, height, selection, self._sides[-1].aspect, scale)
+        if bar_x is not None:
+            self._draw_bar(bar_x, area, rect_px, height, scale)
         context.enable_only(moderngl.NOTHING)
         context.viewport = (0, 0, *framebuffer_size)
 
@@ -405,6 +401,15 @@ class Display:
             array.release()
         for program in self._programs:
             program.release()
+
+    def _shown(self, area: PixelRect, bar_x: float | None) -> list[tuple[_Side, PixelRect]]:
+        """Which side is seen in which part of the area."""
+        if bar_x is None:
+            return [(self._sides[-1], area)]
+        x, y, width, height = area
+        cut = min(max(round(bar_x), x), x + width)
+        left, right = (x, y, cut - x, height), (cut, y, x + width - cut, height)
+        return [(side, part) for side, part in zip(self._sides, (left, right), strict=True) if part[2] > 0]
 
     def _map(self, side: _Side, settings: DisplaySettings) -> None:
         wanted = (settings.exposure, settings.curve)
@@ -441,7 +446,7 @@ class Display:
     def _draw_side(
         self,
         side: _Side,
-        part: tuple[int, int, int, int],
+        part: PixelRect,
         rect_px: Rect,
         settings: DisplaySettings,
         framebuffer_height: int,
@@ -469,7 +474,7 @@ class Display:
     def _draw_bar(
         self,
         bar_x: float,
-        area: tuple[int, int, int, int],
+        area: PixelRect,
         rect_px: Rect,
         framebuffer_height: int,
         scale: float,

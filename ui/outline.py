@@ -141,6 +141,8 @@ class Outlined:
 
 def inside(rect_px: Rect, clip_px: Rect | None, framebuffer_size: tuple[int, int] | None) -> PixelRect | None:
     """The whole pixels that a rectangle touches inside others; None where there are none."""
+    if not (rect_px[2] > 0 and rect_px[3] > 0 and all(map(math.isfinite, rect_px))):
+        return None
     x0, y0 = math.floor(rect_px[0]), math.floor(rect_px[1])
     x1, y1 = math.ceil(rect_px[0] + rect_px[2]), math.ceil(rect_px[1] + rect_px[3])
     bounds = [] if clip_px is None else [clip_px]
