@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from functools import partial
 from pathlib import Path
 
@@ -82,7 +81,8 @@ class App:
             self._shown_frame = editor.frame
         window.begin_frame()
         self._rect = self.workspace.draw(editor)
-        is_held = self.viewport.update(editor, self._rect) or imgui.is_any_item_active()
+        is_held = self.viewport.update(editor, self._rect, self.display.overlay())
+        is_held = is_held or imgui.is_any_item_active()
         editor.is_flying = self.viewport.is_flying
         editor.settle(is_held)
         window.set_title(editor.title)
@@ -92,7 +92,7 @@ class App:
     def close(self) -> None:
         """Stop the renderer, keep the preferences, close the window."""
         self.renderer.close()
-        self.recovery.close()
+        self.recovery.remove()
         self.editor.preferences = self.editor.preferences.with_window_size(*self.window.size)
         self._keep_preferences()
         self.display.release()
@@ -130,13 +130,12 @@ class App:
     def _offer_recovery(self) -> None:
         editor = self.editor
         for found in recovery.find_left_behind():
-            written = time.strftime("%Y-%m-%d %H:%M", time.localtime(found.time))
             editor.dialog = Question(
                 "Recover",
-                f"The editor ended without saving {found.name}. Open what it had on {written}?",
+                f"The editor ended without saving {found.name}. Open what it had on {found.saved_at}?",
                 (
                     Choice("Recover", partial(self._recover, found)),
-                    Choice("Discard", partial(recovery.discard, found)),
+                    Choice("Discard", found.remove),
                     Choice("Later", lambda: None),
                 ),
             )

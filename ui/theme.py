@@ -56,6 +56,7 @@ _COLORS: dict[str, Rgba] = {
     "docking_preview": (0.91, 0.49, 0.16, 0.5),
     "docking_empty_bg": (0.0, 0.0, 0.0, 0.0),
     "nav_cursor": ACCENT,
+    "modal_window_dim_bg": (0.0, 0.0, 0.0, 0.55),
     "text_selected_bg": (0.91, 0.49, 0.16, 0.45),
     "drag_drop_target": ACCENT,
 }

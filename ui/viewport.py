@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from imgui_bundle import imgui
 
+from incpt.live import Frame
 from incpt.scene import Camera
 from incpt.ui import bindings, camera_moves, places, theme
 from incpt.ui.bindings import Action, Button
@@ -14,6 +15,7 @@ from incpt.ui.display import Display, split_x
 from incpt.ui.editor import ZOOM_REST_SECONDS, Editor
 from incpt.ui.gizmo import Gizmo
 from incpt.ui.outline import Outlined
+from incpt.ui.overlays import Overlay
 from incpt.ui.renderer import Pick
 from incpt.ui.selection import Selection
 
@@ -22,8 +24,8 @@ Rect = tuple[float, float, float, float]
 
 _BAR_POINTS = 6.0
 """How near the mouse has to be to take the bar of the split view."""
-_NUMBERS_POINTS = 22.0
-"""Tiles have to be that wide on the screen for their numbers to be legible."""
+_NUMBERS_MARGIN = 4.0
+"""Tiles have to be that much wider on the screen than their numbers, points."""
 
 
 @dataclass
@@ -52,9 +54,9 @@ class Viewport:
 
     # ------------------------------------------------------------------------------------ one frame
 
-    def update(self, editor: Editor, rect: Rect) -> bool:
-        """Take the mouse and the keys of a frame, `rect` being what the panels leave; returns whether
-        something is being dragged."""
+    def update(self, editor: Editor, rect: Rect, overlay: Overlay | None = None) -> bool:
+        """Take the mouse and the keys of a frame, `rect` being what the panels leave, and write over the
+        picture what belongs to its `overlay`; returns whether something is being dragged."""
         picture = picture_rect(rect, editor.scene.settings.size)
         editor.viewport_size = _whole_size(rect)
         places.note_rect(
@@ -64,7 +66,7 @@ class Viewport:
         self._use_bar(editor, picture)
         self._use_mouse(editor, picture)
         self._use_wheel(editor, picture)
-        self._write_over(editor, rect)
+        _write_over(editor, picture, overlay)
         is_dragging = self._press is not None and self._press.is_drag
         return self.gizmo.is_using or self._holds_bar or is_dragging or self._is_flying
 
@@ -203,23 +205,6 @@ class Viewport:
         io = imgui.get_io()
         return not (io.want_capture_mouse or self.gizmo.is_using or self.gizmo.is_over or editor.dialog)
 
-    # ------------------------------------------------------------------------- written over the picture
-
-    def _write_over(self, editor: Editor, rect: Rect) -> None:
-        if editor.frame is None:
-            return
-        draw = imgui.get_background_draw_list()
-        line = imgui.get_text_line_height()
-        if editor.preferences.display.split and len(editor.frame.pictures) == 2:
-            picture = picture_rect(rect, editor.scene.settings.size)
-            bar = split_x(picture, editor.preferences.display.split_position)
-            left, right = editor.frame.pictures
-            texts = [f"{p.strategy}, {p.seconds:.2f} s" + _error_text(p.error) for p in (left, right)]
-            width = imgui.calc_text_size(texts[0]).x
-            y = picture[1] + line * 0.4
-            _label(draw, (bar - width - line, y), texts[0])
-            _label(draw, (bar + line, y), texts[1])
-
 
 def picture_rect(rect: Rect, size: tuple[int, int]) -> Rect:
     """Where an image of `size` pixels lies in what the panels leave: as large as fits, in the middle, on
@@ -264,6 +249,52 @@ def _modifiers() -> list[str]:
     io = imgui.get_io()
     held = ((io.key_ctrl, bindings.CTRL), (io.key_shift, bindings.SHIFT), (io.key_alt, bindings.ALT))
     return [name for is_held, name in held if is_held]
+
+
+# ------------------------------------------------------------------------- written over the picture
+
+
+def _write_over(editor: Editor, picture: Rect, overlay: Overlay | None) -> None:
+    draw = imgui.get_background_draw_list()
+    if overlay is not None and editor.preferences.display.overlay != "none":
+        _write_numbers(draw, overlay, editor, picture)
+        _write_legend(draw, overlay, picture)
+    if editor.frame is not None and editor.preferences.display.split and len(editor.frame.pictures) == 2:
+        _write_sides(draw, editor.frame, editor.preferences.display.split_position, picture)
+
+
+def _write_numbers(draw: imgui.ImDrawList, overlay: Overlay, editor: Editor, picture: Rect) -> None:
+    if editor.frame is None or overlay.numbers is None or overlay.numbers_at is None:
+        return
+    shown = editor.frame.pictures[-1]
+    height, width = shown.image.shape[:2]
+    scale = picture[2] / width, picture[3] / height
+    widest = imgui.calc_text_size(str(int(overlay.numbers.max(initial=0)))).x
+    if shown.grid.tile_size * scale[0] < widest + _NUMBERS_MARGIN:
+        return
+    white, half = imgui.get_color_u32(imgui.ImVec4(1.0, 1.0, 1.0, 0.9)), imgui.get_text_line_height() / 2
+    for number, (x, y) in zip(overlay.numbers.tolist(), overlay.numbers_at.tolist(), strict=True):
+        text = str(number)
+        left = picture[0] + x * scale[0] - imgui.calc_text_size(text).x / 2
+        draw.add_text((left, picture[1] + y * scale[1] - half), white, text)
+
+
+def _write_legend(draw: imgui.ImDrawList, overlay: Overlay, picture: Rect) -> None:
+    line = imgui.get_text_line_height()
+    x, y = picture[0] + line * 0.6, picture[1] + picture[3] - line * 1.4
+    for text, (red, green, blue) in overlay.legend:
+        _label(draw, (x + line * 1.2, y), text)
+        tint = imgui.get_color_u32(imgui.ImVec4(red / 255, green / 255, blue / 255, 1.0))
+        draw.add_rect_filled((x, y), (x + line * 0.8, y + line), tint, 2.0)
+        y -= line * 1.35
+
+
+def _write_sides(draw: imgui.ImDrawList, frame: Frame, position: float, picture: Rect) -> None:
+    line = imgui.get_text_line_height()
+    bar, y = split_x(picture, position), picture[1] + line * 0.5
+    left, right = (f"{p.strategy}, {p.seconds:.2f} s" + _error_text(p.error) for p in frame.pictures)
+    _label(draw, (bar - imgui.calc_text_size(left).x - line, y), left)
+    _label(draw, (bar + line, y), right)
 
 
 def _label(draw: imgui.ImDrawList, at: tuple[float, float], text: str) -> None:
