@@ -22,11 +22,13 @@ class Outcome:
     """What a task found: `values`, and `rows` where there are several of something.
 
     None of either: it could not be measured here, for the reason `skipped`, which is printed and not kept.
+    `load` is that of the timed part, where work went on after it.
     """
 
     values: Row = field(default_factory=dict)
     rows: Sequence[Row] = ()
     skipped: str | None = None
+    load: Row | None = None
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,7 @@ def run(store: Store, tasks: Sequence[Task], environment: Mapping[str, Any]) -> 
     if len(missing) < len(tasks):
         print(f"{len(tasks) - len(missing)} of {len(tasks)} measurements were there", file=sys.stderr)
     done = len(tasks) - len(missing)
+    reasons: set[str] = set()
     try:
         with interruption() as stop, task_progress(sum(task.weight for task in missing)) as progress:
             for task in missing:
@@ -84,10 +87,12 @@ def run(store: Store, tasks: Sequence[Task], environment: Mapping[str, Any]) -> 
                 work = Work(progress, stop)
                 outcome = task.measure(work)
                 if outcome.skipped is None:
-                    store.add(task.subject, environment, work.load(), dict(outcome.values), outcome.rows)
+                    load = work.load() if outcome.load is None else outcome.load
+                    store.add(task.subject, environment, load, dict(outcome.values), outcome.rows)
                     done += 1
-                else:
-                    progress.say(f"{task.label}: skipped: {outcome.skipped}")
+                elif outcome.skipped not in reasons:
+                    reasons.add(outcome.skipped)
+                    progress.say(f"skipped: {outcome.skipped}")
                 progress.end()
     except KeyboardInterrupt:
         raise Stopped(

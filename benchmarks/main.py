@@ -9,6 +9,7 @@ import typer
 
 from incpt.benchmarks import sweep
 from incpt.benchmarks.experiment import Stopped
+from incpt.benchmarks.peers import compare
 
 INTERRUPTED = 130
 
@@ -23,6 +24,7 @@ app = typer.Typer(
 
 # A new command is a line here.
 app.command("sweep")(sweep.sweep)
+app.command("peers")(compare.peers)
 
 
 @app.callback()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rich.console import Console
 from rich.table import Table
 
@@ -11,11 +13,12 @@ WIDTH = 250
 """Columns where there is no terminal."""
 
 
-def print_table(table: Table, results: Results, store: Store) -> None:
-    """The table, on what it was measured, whether the machine was busy, and where all of it is."""
+def print_table(tables: Table | Sequence[Table], results: Results, store: Store) -> None:
+    """The tables, on what they were measured, whether the machine was busy, and where all of it is."""
     console = Console()
     wide = console if console.is_terminal else Console(width=WIDTH)
-    wide.print(table)
+    for table in [tables] if isinstance(tables, Table) else tables:
+        wide.print(table)
     for line in notes(results):
         wide.print(line, markup=False)
     names = ", ".join(store.path.with_suffix(suffix).name for suffix in (".jsonl", ".csv", ".json"))

@@ -1,0 +1,62 @@
+"""incpt itself, as one of the compared renderers."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+from incpt.benchmarks.peers.peer import FloatImage, Job
+from incpt.device import Device
+from incpt.scene import Vector
+from incpt.session import Session
+from incpt.settings import RenderSettings
+
+_MOST_SAMPLES_PER_STEP = 16
+
+
+class IncptPeer:
+    """Renders as `Session` does. Like the others it is told how many samples are wanted: a step takes as
+    many of a pixel as divide that number, 16 at most."""
+
+    def __init__(self) -> None:
+        self._device = Device()
+        self._session: Session | None = None
+
+    def load(self, job: Job) -> None:
+        settings = RenderSettings(
+            size=job.size, max_bounces=job.max_bounces, transmission_bounces=job.transmission_bounces,
+            strategy="restart",
+        )  # fmt: skip
+        self._session = Session(job.scene, settings=settings, device=self._device)
+
+    def time(self, spp: int, seed: int) -> float:
+        session = self._prepared(spp, seed)
+        began = time.perf_counter()
+        session.render(spp)
+        session.device.finish()
+        return time.perf_counter() - began
+
+    def image(self, spp: int, seed: int) -> FloatImage:
+        session = self._prepared(spp, seed)
+        session.render(spp)
+        return session.image()
+
+    def move(self, name: str, position: Vector, seed: int) -> float:
+        session = self._prepared(1, seed)
+        session.step()
+        scene = session.scene.with_object(name, position=position)
+        began = time.perf_counter()
+        session.edit(scene)
+        session.step()
+        session.image()
+        return time.perf_counter() - began
+
+    def _prepared(self, spp: int, seed: int) -> Session:
+        assert self._session is not None
+        rate = max(r for r in range(1, _MOST_SAMPLES_PER_STEP + 1) if spp % r == 0)
+        # Another seed starts the picture over; the same one would go on with it.
+        settings = replace(self._session.settings, seed=seed, sample_rate=rate)
+        other = replace(settings, seed=(seed + 1) % (1 << 32))
+        self._session.configure(other)
+        self._session.configure(settings)
+        return self._session
