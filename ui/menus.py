@@ -18,6 +18,7 @@ _MODIFIERS = {
     "Alt": imgui.Key.mod_alt,
 }
 _KEY_NAMES = {"KeypadDecimal": "keypad_decimal"}
+_ANY_POPUP = imgui.PopupFlags_.any_popup
 
 
 def draw_menu_bar(editor: Editor) -> None:
@@ -39,6 +40,9 @@ def press_keys(editor: Editor) -> None:
     """Run the command whose keys went down in this frame; not while a text is typed, a dialog is open or the
     camera flies, whose keys are letters."""
     if imgui.get_io().want_text_input or editor.dialog is not None or editor.is_flying:
+        return
+    if imgui.is_key_pressed(imgui.Key.escape, False) and imgui.is_popup_open("", _ANY_POPUP):
+        imgui.internal.close_popup_to_level(0, True)
         return
     navigation = editor.preferences.navigation
     for one in COMMANDS:
