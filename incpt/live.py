@@ -3,7 +3,7 @@
 A viewer hands in what it wants to see, a `View`, and calls `advance` over and over; each call does one
 bounded piece of work and returns the `Frame` to show. There is no thread in here and nothing waits.
 
-- A step takes about the time that the view asks for: its slots follow the speed measured in the same mode.
+- A step takes about the time that the view asks for: its slots follow from what the same tiles took before.
 - Between two steps only the latest view counts. An edit is taken up once the one before it has been answered
   by a finished tile (or, where everything starts over, by a whole picture), because otherwise a drag that is
   faster than a tile would never show anything.
@@ -19,7 +19,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 
@@ -33,7 +33,7 @@ from incpt.export import write_picture
 from incpt.metrics import normalized_rmse
 from incpt.modes import Event, Mode, next_mode
 from incpt.scene import Scene, diff
-from incpt.session import PICTURE_SETTINGS, Aovs, Session, StepReport, affected_objects
+from incpt.session import PICTURE_SETTINGS, Aovs, Session, StepReport, affected_objects, check_settings
 from incpt.settings import RenderSettings
 
 Float32Image = npt.NDArray[np.float32]
@@ -52,6 +52,8 @@ MOST_AHEAD = 2
 """Steps that the answer to an edit may cost the other side of a split view in advance."""
 AOV_SHARE = 0.2
 """Of the time of a step, for first-hit images while the scene changes."""
+MOST_BELIEVED = 4.0
+"""How many times slower or faster a tile may become from one step to the next."""
 COARSEST = 16
 """The largest divisor of the resolution while everything starts over."""
 
@@ -141,22 +143,52 @@ class Frame:
     resting: bool
 
 
-@dataclass
 class _Pace:
-    """How fast steps of one kind are, in paths per second: the median of the last three, so that a single
-    slow step changes nothing."""
+    """How fast something is, in paths per second: the median of the last three times, so that a single slow
+    one changes nothing."""
 
-    guess: float
-    speeds: deque[float] = field(default_factory=lambda: deque(maxlen=3))
+    def __init__(self, guess: float) -> None:
+        self._guess = guess
+        self._speeds: deque[float] = deque(maxlen=3)
 
     @property
     def speed(self) -> float:
-        return median(self.speeds) if self.speeds else self.guess
+        return median(self._speeds) if self._speeds else self._guess
 
     def add(self, paths: int, seconds: float) -> None:
-        speed = paths / max(seconds, 1e-6)
-        # Small steps look slower than they are; a large jump upwards could make a step far too long.
-        self.speeds.append(min(speed, 4 * self.speed))
+        self._speeds.append(paths / max(seconds, 1e-6))
+
+
+class _Costs:
+    """What a path of each tile takes, seconds. Speed differs tenfold between sky and glass, so that the last
+    step says little about the next tiles, but the last pass much."""
+
+    def __init__(self, count: int) -> None:
+        self._seconds = np.full(count, np.nan)
+        self._last = 0.0
+
+    def add(self, touched: npt.NDArray[np.int32], paths: int, seconds: float) -> None:
+        """Learn from a step. A stall of the machine is not believed at once, nor is one that is over."""
+        old = self._seconds[touched]
+        new = np.full(len(touched), seconds / paths)
+        known = np.isfinite(old)
+        new[known] = np.clip(new[known], old[known] / MOST_BELIEVED, old[known] * MOST_BELIEVED)
+        self._seconds[touched] = new
+        self._last = float(np.median(new))
+
+    def slots(self, queue: tiles.Queue, cursor: tiles.Cursor, area: int, seconds: float, guess: float) -> int:
+        """How many slots of `area` paths, from `cursor` on, take so long. `guess`: seconds of a path where
+        there is no better knowledge."""
+        guess = max(guess, self._last)
+        longest = 4 + int(8 * seconds / (guess * area * queue.samples))
+        ahead = self._seconds[queue.tiles[cursor.tiles : cursor.tiles + longest]]
+        per_slot = np.where(np.isfinite(ahead), ahead, guess) * area
+        ends = np.cumsum(per_slot * queue.samples) - per_slot[0] * cursor.samples
+        whole = int(np.searchsorted(ends, seconds, side="right"))
+        if whole == len(ahead):
+            return whole * queue.samples - cursor.samples
+        begin = ends[whole] - per_slot[whole] * queue.samples
+        return whole * queue.samples - cursor.samples + int((seconds - begin) / per_slot[whole])
 
 
 class _Side:
@@ -164,15 +196,15 @@ class _Side:
 
     def __init__(self, view: View, device: Device, strategy: str | None, clock: Callable[[], float]) -> None:
         self.view, self.strategy, self._clock = view, strategy, clock
-        guess = 1e6 if device.is_cpu else 5e7
-        self._paces = {mode: _Pace(guess) for mode in Mode}
-        self._whole_pictures = _Pace(guess)
+        self._whole_pictures = _Pace(1e6 if device.is_cpu else 5e7)
         self._pass_paths, self._pass_seconds = 0, 0.0
         self.divisor = 1
         self.divisor = self._fitting_divisor(view)
         self.session = Session(view.scene, settings=self._settings(view, self.divisor), device=device)
         self.changed_at = -math.inf
         """When the scene changed last; -inf: nobody waits for it to rest, at first and after a drag."""
+        self.full_view = view if self.divisor == 1 else None
+        """The last one that was rendered at full resolution."""
         self.spent = 0.0
         """Rendering time in all, to share the device fairly."""
         self._image: Float32Image | None = None
@@ -180,6 +212,7 @@ class _Side:
         self._error: float | None = None
         self._compared_at = -math.inf
         self._compared: Float32Image | None = None
+        self._costs_grid, self._costs = self.session.grid, _Costs(self.session.grid.count)
         self._begin()
 
     def _begin(self) -> None:
@@ -213,6 +246,8 @@ class _Side:
         starts_over = self._starts_over(view)
         divisor = self._fitting_divisor(view) if starts_over and with_preview else self.divisor
         settings = self._settings(view, divisor)
+        if divisor > 1:
+            check_settings(self._settings(view, 1))
         since = view.before
         if since is None and settings.nor > session.settings.nor:
             since = old.before
@@ -224,6 +259,8 @@ class _Side:
         if divisor > 1 and session.mode is Mode.INCREMENTAL:
             session.restart()
         self.view, self.divisor = view, divisor
+        if divisor == 1:
+            self.full_view = view
         if session.grid != grid or (session.queue is not queue and session.mode is not Mode.REFINE):
             self.changed_at = self._clock()
             self._begin()
@@ -244,6 +281,7 @@ class _Side:
         """Render at the full resolution from now on."""
         self.session.configure(self._settings(self.view, 1))
         self.divisor = 1
+        self.full_view = self.view
         self._pass_paths, self._pass_seconds = 0, 0.0
         self._forget_tiles()
 
@@ -270,7 +308,7 @@ class _Side:
         if view.before is not None:
             # A tile is to fit a step, also where tiles are large.
             per_tile = settings.tile_size**2 * settings.sample_rate
-            fitting = int(self._paces[Mode.INCREMENTAL].speed * view.step_ms / 1e3 / per_tile)
+            fitting = int(self._whole_pictures.speed * view.step_ms / 1e3 / per_tile)
             nor = min(nor, view.drag_nor, max(fitting, 1))
         size = -(-width // divisor), -(-height // divisor)
         strategy = self.strategy or settings.strategy
@@ -312,11 +350,13 @@ class _Side:
     def step(self, step_ms: float) -> StepReport:
         """One step of about that length."""
         session = self.session
-        pace = self._paces[session.mode]
+        slots, queue, first = self._slots(step_ms / 1e3), session.queue, session.cursor.tiles
         start = self._clock()
-        report = session.step(self._slots(pace.speed * step_ms / 1e3))
+        report = session.step(slots)
         seconds = max(self._clock() - start, 1e-6)
-        pace.add(report.paths, seconds)
+        if self.divisor == 1:
+            touched = queue.tiles[first : report.queue_done + 1]
+            self._costs.add(touched, report.paths, seconds)
         self.seconds += seconds
         self.spent += seconds
         self.nonfinite += report.nonfinite
@@ -333,31 +373,48 @@ class _Side:
             self.answered = self._must_read = True
         return replace(report, seconds=seconds)
 
-    def _slots(self, paths: float) -> int:
-        """Slots for about so many paths. A little more ends the queue where only a little is left of it."""
+    def _slots(self, seconds: float) -> int:
+        """Slots of a step of that length. A little more ends the queue where only a little is left of it."""
         session = self.session
-        slots = max(1, int(paths / session.settings.tile_size**2))
-        cursor, queue = session.cursor, session.queue
+        cursor, queue, settings = session.cursor, session.queue, session.settings
         left = len(queue.tiles) * queue.samples - cursor.tiles * queue.samples - cursor.samples
-        if left <= 1.5 * slots or (self.divisor > 1 and session.mode is Mode.BASE):
+        if self.divisor > 1 and session.mode is Mode.BASE:
+            slots = left
+        else:
+            slots = self._known_costs().slots(
+                queue, cursor, settings.tile_size**2, seconds, 1 / self._whole_pictures.speed
+            )
+        if left <= 1.3 * slots:
             slots = left
         most = self.view.scene.settings.slots_per_step
-        return slots if most is None else min(slots, most * session.settings.sample_rate)
+        return max(1, slots if most is None else min(slots, most * settings.sample_rate))
+
+    def _known_costs(self) -> _Costs:
+        grid = self.session.grid
+        if self.divisor > 1:
+            return _Costs(grid.count)
+        if grid != self._costs_grid:
+            self._costs_grid, self._costs = grid, _Costs(grid.count)
+        return self._costs
 
     # ------------------------------------------------------------------------------------ pictures
 
-    def picture(self, reference: Float32Image | None, resting: bool) -> Picture:
-        """What there is to show; the image is read where that is worth it."""
-        session = self.session
+    def image(self, resting: bool) -> Float32Image:
+        """(h, w, 4) the picture, read anew where that is worth it."""
         if self._image is None or (
             self._is_stale
             and (resting or self._must_read or self._clock() - self._read_at >= self._image_seconds())
         ):
-            self._image = session.image(alpha=True)
+            self._image = self.session.image(alpha=True)
             self._read_at, self._must_read, self._is_stale = self._clock(), False, False
-        self._compare(reference)
+        return self._image
+
+    def picture(self, reference: Float32Image | None, resting: bool) -> Picture:
+        """What there is to show."""
+        session, image = self.session, self.image(resting)
+        self._compare(image, reference, resting)
         return Picture(
-            image=self._image,
+            image=image,
             grid=session.grid,
             mode=session.mode,
             queue=session.queue.tiles,
@@ -376,13 +433,13 @@ class _Side:
         is_settled = int(self.session.tile_spp.min()) >= SETTLED_SPP
         return REFINE_IMAGE_SECONDS * (3 if is_settled else 1)
 
-    def _compare(self, reference: Float32Image | None) -> None:
-        image = self._image
-        if reference is None or image is None or reference.shape[:2] != image.shape[:2]:
+    def _compare(self, image: Float32Image, reference: Float32Image | None, resting: bool) -> None:
+        if reference is None or reference.shape[:2] != image.shape[:2]:
             self._error = None
             return
         now = self._clock()
-        if self._error is None or (image is not self._compared and now - self._compared_at >= ERROR_SECONDS):
+        is_due = resting or now - self._compared_at >= ERROR_SECONDS
+        if self._error is None or (image is not self._compared and is_due):
             self._error = normalized_rmse(image[..., :3], reference)
             self._compared, self._compared_at = image, now
 
@@ -440,7 +497,7 @@ class Live:
             self._rest_is_shown = side is None
             return self._frame(resting=side is None)
         except (DeviceError, MemoryError) as error:
-            raise RenderingStoppedError(str(error) or "memory ran out; use a smaller image") from error
+            raise RenderingStoppedError(_explain(error)) from error
 
     def pick(self, point: tuple[float, float]) -> str | None:
         """The name of the object at a point (x, y) from the top left in units of the image, or None."""
@@ -479,13 +536,19 @@ class Live:
             view = self._view
         elif view != self._view:
             self._rest_is_shown = False
-        good = self._main.view
+        good: View | None = self._main.view
         try:
             self._split(view)
             for side in self._sides:
                 if not side.shows(view) and (view.paused or side.may_change(view)):
                     self._change(side, view)
-        except (InputError, DeviceError, MemoryError):
+            good = self._main.full_view
+            for side in self._sides:
+                if side.divisor > 1 and side.answered and side.rests and not view.paused:
+                    side.return_to_full()
+        except (InputError, DeviceError, MemoryError) as error:
+            if good is None:
+                raise RenderingStoppedError(_explain(error)) from error
             self._refused = view
             self._view = replace(
                 view,
@@ -534,9 +597,6 @@ class Live:
         return side
 
     def _step(self, side: _Side) -> None:
-        for one in self._sides:
-            if one.divisor > 1 and one.answered and one.rests:
-                one.return_to_full()
         report = side.step(self._view.step_ms)
         if side is self._main:
             self._step_seconds = report.seconds
@@ -544,7 +604,7 @@ class Live:
             self._speed = speed if self._speed == 0 else 0.8 * self._speed + 0.2 * speed
 
     def _update_aovs(self) -> None:
-        """First hits of the scene as it is shown; fewer than pixels while it changes, so that they cost little."""
+        """First hits of the scene that is shown; fewer than pixels while it changes, to cost little."""
         main = self._main
         scene, (width, height) = main.view.scene, main.view.size
         divisor = 1
@@ -561,10 +621,10 @@ class Live:
         self._aov_pace.add(size[0] * size[1], self._clock() - start)
 
     def _frame(self, resting: bool) -> Frame:
-        pictures = tuple(side.picture(self._reference, resting) for side in self._sides)
         main, view = self._main, self._view
-        if self._is_pinning and main.divisor == 1 and pictures[-1].image[..., 3].min() > 0:
-            self._reference, self._is_pinning = pictures[-1].image[..., :3], False
+        if self._is_pinning and main.divisor == 1 and main.image(resting)[..., 3].min() > 0:
+            self._reference, self._is_pinning = main.image(resting)[..., :3], False
+        pictures = tuple(side.picture(self._reference, resting) for side in self._sides)
         if not main.shows(view):
             shown = main.view
             view = replace(
@@ -581,3 +641,7 @@ class Live:
             nonfinite=sum(side.nonfinite for side in self._sides),
             resting=resting,
         )
+
+
+def _explain(error: Exception) -> str:
+    return str(error) or "memory ran out; use a smaller image or scene"

@@ -347,18 +347,11 @@ class Session:
         self._enter(Mode.BASE)
 
     def _slot_count(self) -> int:
-        slots = self.settings.slots_per_step or self._grid.count
-        return slots * self.settings.sample_rate
+        return _slot_count(self.settings)
 
     def _stride_of_settings(self) -> int:
-        stride = path_buffer_stride(self._slot_count(), self.settings.tile_size)
-        if 3 * stride > _MOST_PATH_FLOATS:
-            most = (_MOST_PATH_FLOATS // 3 - layout.WORK_GROUP_SIZE) // self.settings.tile_size**2
-            raise InputError(
-                f"sample_rate: a step of {self._slot_count():,} slots is more than the {most:,} that can be "
-                f"addressed; choose a smaller sample_rate or slots_per_step"
-            )
-        return stride
+        check_settings(self.settings)
+        return path_buffer_stride(self._slot_count(), self.settings.tile_size)
 
     def _resize_path_buffer(self, stride: int) -> None:
         if stride != self._buffer_stride:
@@ -442,6 +435,22 @@ def _one_slot() -> npt.NDArray[np.void]:
     slot = np.zeros(1, layout.SLOT)
     slot["group_count"] = 1
     return slot
+
+
+def check_settings(settings: RenderSettings) -> None:
+    """Raises InputError where a step of the settings is larger than kernels can address."""
+    slots = _slot_count(settings)
+    if 3 * path_buffer_stride(slots, settings.tile_size) > _MOST_PATH_FLOATS:
+        most = (_MOST_PATH_FLOATS // 3 - layout.WORK_GROUP_SIZE) // settings.tile_size**2
+        raise InputError(
+            f"sample_rate: a step of {slots:,} slots is more than the {most:,} that can be "
+            f"addressed; choose a smaller sample_rate or slots_per_step"
+        )
+
+
+def _slot_count(settings: RenderSettings) -> int:
+    slots = settings.slots_per_step or tiles.TileGrid(*settings.size, settings.tile_size).count
+    return slots * settings.sample_rate
 
 
 def affected_objects(old: Scene, new: Scene, change: Change) -> list[Object]:

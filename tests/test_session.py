@@ -192,6 +192,129 @@ def test_change_that_nobody_sees_keeps_everything(device: Device) -> None:
     assert_same(rendered(device, mixed_scene(), 3).image(), (session.step(), session.image())[1])
 
 
+def test_steps_of_a_drag_are_measured_from_where_it_began(device: Device) -> None:
+    start = mixed_scene()
+    session = rendered(device, start, 1)
+    far = [start.with_object("red cube", position=(x, 0.5, 0.4)) for x in (0.5, 1.0, 2.0)]
+    for scene in far:
+        session.edit(scene, since=start)
+    alone = rendered(device, start, 1)
+    alone.edit(far[-1])
+    np.testing.assert_array_equal(session.queue.tiles, alone.queue.tiles)
+    session.edit(start, since=start)  # back where it was: the last place counts
+    assert session.mode is Mode.INCREMENTAL
+
+
+def test_same_scene_again_ends_a_drag_with_the_whole_nor(device: Device) -> None:
+    start = mixed_scene(nor=4)
+    session = rendered(device, start, 1)
+    end = moved(start)
+    session.edit(end, since=start)
+    session.render(6)
+    session.edit(end, since=start, settings=replace(session.settings, nor=16))
+    assert session.mode is Mode.INCREMENTAL and session.cursor == Cursor()
+    session.render(16)
+    assert_same(session.image(), rendered(device, end, 16).image())
+
+
+def test_end_of_a_drag_starts_nothing_over(device: Device) -> None:
+    start = mixed_scene()
+    end = moved(start)
+    session = Session(start, settings=replace(start.settings, slots_per_step=5), device=device)
+    session.edit(end, since=start)
+    session.step()
+    cursor = session.cursor
+    session.edit(end, since=start)
+    assert session.mode is Mode.BASE and session.cursor == cursor
+    turned = start.with_camera(fov_y=50.0)
+    session.edit(turned, since=start)
+    session.render(2)
+    session.edit(turned, since=start)
+    assert session.mode is Mode.REFINE and (session.spp() == 2).all()
+
+
+def test_nor_may_change_before_the_first_step_of_an_edit(device: Device) -> None:
+    session = rendered(device, mixed_scene(), 1)
+    session.edit(moved(session.scene))
+    order = session.queue.tiles
+    session.configure(replace(session.settings, nor=3))
+    np.testing.assert_array_equal(session.queue.tiles, order)
+    report = session.step()
+    assert report.mode is Mode.INCREMENTAL
+    assert (session.tile_spp[report.tiles] == 3).all()
+
+
+def test_step_takes_as_many_slots_as_it_is_given(device: Device, converged: np.ndarray) -> None:
+    session = Session(mixed_scene(slots_per_step=1), device=device)
+    assert [session.step(slots).paths // 64 for slots in (1, 5, 3, 1000, 24)] == [1, 5, 3, 15, 24]
+    session.render(64)
+    assert_same(session.image(), converged)
+
+
+def test_step_makes_do_with_the_memory_there_is(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = Session(mixed_scene(slots_per_step=4), device=device)
+
+    def fail(_: int) -> None:
+        raise DeviceError("no memory")
+
+    empty = device.empty
+    monkeypatch.setattr(device, "empty", lambda nbytes: fail(nbytes) if nbytes > 12 * 400 else empty(nbytes))
+    assert session.step(20).paths == 4 * 64
+    monkeypatch.undo()
+    session.render(4)
+    assert_same(session.image(), rendered(device, mixed_scene(), 4).image())
+
+
+def test_alpha_tells_where_there_was_a_picture(device: Device) -> None:
+    session = Session(mixed_scene(slots_per_step=6), device=device)
+    session.step()
+    image = session.image(alpha=True)
+    assert image.shape == (28, 44, 4)
+    np.testing.assert_array_equal(image[..., 3], session.spp() == 1)
+    session.restart()
+    assert not session.spp().any() and session.mode is Mode.BASE
+    np.testing.assert_array_equal(session.image(alpha=True), image)
+
+
+def test_no_kernel_is_built_after_building(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    bright = mixed_scene().with_environment(image=None)
+    opaque = mixed_scene().without_object("glass ball").with_material("glass", transmission=0.0)
+    for scene in (mixed_scene(), bright, bright.without_object("lamp"), opaque):
+        monkeypatch.setattr(device, "_kernels", {})
+        monkeypatch.setattr(device, "built", set())
+        session = Session(scene, device=device)
+        seen: list[tuple[int, int]] = []
+        session.build(lambda *progress: seen.append(progress))  # noqa: B023
+        assert seen == [(i + 1, len(seen)) for i in range(len(seen))] and len(seen) >= 16
+        with monkeypatch.context() as patch:
+            patch.setattr(device, "_build", None)
+            session.render(3)
+            session.edit(moved(scene))
+            session.render(17)
+            session.image()
+            session.aovs()
+            assert session.pick((22, 14)) == "red cube"
+            session.build(lambda *_: pytest.fail("is built already"))
+        assert_same(session.image(), rendered(device, moved(scene), 17).image())
+
+
+def test_building_may_be_stopped_and_go_on(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(device, "built", set())
+    session = Session(mixed_scene(), device=device)
+
+    def stop(done: int, _: int) -> None:
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        session.build(stop)
+    seen: list[int] = []
+    session.build(lambda done, _: seen.append(done))
+    assert seen[0] == 1 and len(seen) > 3
+    session.render(2)
+    assert_same(session.image(), rendered(device, mixed_scene(), 2).image())
+
+
 def test_point_of_change_may_be_the_pixel(device: Device) -> None:
     session = rendered(device, mixed_scene(point_of_change="pixel"), 1)
     session.edit(moved(session.scene), pixel=(43, 27))
@@ -314,6 +437,17 @@ def test_picks_what_is_under_the_pixel(device: Device) -> None:
         session.pick((44, 0))
 
 
+def test_picks_what_is_under_a_point(device: Device) -> None:
+    session = Session(mixed_scene(), device=device)
+    for y in range(0, 28, 3):
+        for x in range(0, 44, 5):
+            assert session.pick_point(((x + 0.5) / 44, (y + 0.5) / 28)) == session.pick((x, y))
+    ids, names = session.aovs().object_id, [obj.name for obj in session.scene.objects]
+    for y in range(0, 28, 3):
+        for x in range(0, 44, 5):
+            assert session.pick((x, y)) == (names[ids[y, x]] if ids[y, x] >= 0 else None)
+
+
 def test_pick_passes_hidden_objects(device: Device) -> None:
     session = Session(mixed_scene().with_object("red cube", visible=False), device=device)
     assert session.pick((22, 14)) != "red cube"
@@ -327,6 +461,15 @@ def test_pick_keeps_the_picture(device: Device) -> None:
     np.testing.assert_array_equal(session.image(), before)
     session.render(4)
     assert_same(session.image(), rendered(device, mixed_scene(), 4).image())
+
+
+def test_aovs_may_have_another_size(device: Device) -> None:
+    session = rendered(device, mixed_scene(), 1)
+    small = session.aovs((11, 7))
+    assert small.depth.shape == (7, 11) and small.normal.shape == (7, 11, 3)
+    np.testing.assert_array_equal(
+        small.object_id, Session(mixed_scene(size=(11, 7)), device=device).aovs().object_id
+    )
 
 
 def test_aovs_describe_first_hits(device: Device) -> None:

@@ -7,6 +7,7 @@ stands before the first kernel is compiled. PyOpenCL lets other threads run whil
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,6 +17,9 @@ from typing import Protocol
 from incpt.device import Device
 from incpt.errors import DeviceError, InputError, OutputError, one_line
 from incpt.live import Frame, Live, RenderingStoppedError, View
+
+FIGURES_SECONDS = 0.1
+"""Between two Frames with the same picture; a window redraws for each."""
 
 
 @dataclass(frozen=True)
@@ -149,8 +153,15 @@ class ThreadedRenderer:
         self._requests: deque[Request] = deque()
         self._messages: list[Message] = []
         self._closing = False
+        self._images: tuple[object, ...] = ()
+        self._posted_at = 0.0
         self._thread = threading.Thread(target=self._run, name="renderer", daemon=True)
         self._thread.start()
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the thread runs: not after `close`, nor after a fatal problem."""
+        return self._thread.is_alive()
 
     def show(self, view: View) -> None:
         with self._condition:
@@ -180,16 +191,33 @@ class ThreadedRenderer:
             self._messages.append(message)
         self._wake()
 
-    def _wait(self, idle: bool, timeout: float | None) -> tuple[View | None, list[Request]]:
-        """The latest view and the requests since the last call; `idle` waits until there is news."""
+    def _is_worth_showing(self, frame: Frame) -> bool:
+        """Whether it has a new picture, or new figures after a while."""
+        now = time.perf_counter()
+        images = (*(picture.image for picture in frame.pictures), frame.aovs)
+        is_new = len(images) != len(self._images) or any(
+            new is not old for new, old in zip(images, self._images, strict=True)
+        )
+        if not (is_new or frame.resting or now - self._posted_at >= FIGURES_SECONDS):
+            return False
+        self._images, self._posted_at = images, now
+        return True
+
+    def _wait_for_news(self, seen: View | None) -> None:
+        """Until there is a request or another view than `seen`, or the window closes."""
         with self._condition:
-            before = self._view
-            while idle and not (self._closing or self._requests or self._view is not before):
-                if not self._condition.wait(timeout) and timeout is not None:
-                    break
+            self._condition.wait_for(
+                lambda: (
+                    self._closing
+                    or (self._view is not None and (self._view is not seen or bool(self._requests)))
+                )
+            )
+
+    def _take_requests(self) -> list[Request]:
+        with self._condition:
             requests = list(self._requests)
             self._requests.clear()
-            return self._view, requests
+        return requests
 
     def _run(self) -> None:
         try:
@@ -208,17 +236,14 @@ class ThreadedRenderer:
 
     def _loop(self) -> None:
         device = self._device if isinstance(self._device, Device) else Device(self._device)
-        while self._view is None and not self._closing:
-            self._wait(idle=True, timeout=None)
+        self._wait_for_news(None)
         if self._view is None:
             return
-        live, idle, seen = Live(self._view, device, self._report_building), False, self._view
+        live = Live(self._view, device, self._report_building)
         while not self._closing:
-            view, requests = self._wait(idle and self._view is seen, None)
-            assert view is not None
-            for request in requests:
+            for request in self._take_requests():
                 self._answer(live, request)
-            idle, seen = False, view
+            view = self._view
             try:
                 frame = live.advance(view)
             except RenderingStoppedError:
@@ -226,8 +251,9 @@ class ThreadedRenderer:
             except (InputError, DeviceError, MemoryError) as error:
                 self._post(Problem(_explain(error)))
                 continue
-            idle = frame is None
-            if frame is not None:
+            if frame is None:
+                self._wait_for_news(view)
+            elif self._is_worth_showing(frame):
                 self._post(frame)
 
     def _answer(self, live: Live, request: Request) -> None:
