@@ -1,4 +1,4 @@
-#include "scalar.cl"
+#include "state.cl"
 
 // Auxiliary values of the first hit, from rays through pixel centres: `surface` has seven planes (shading
 // normal, distance along the ray in metres, base colour) over the pixels; a miss has distance infinity.

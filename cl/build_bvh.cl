@@ -220,13 +220,17 @@ static Box face_box(__global const int *faces, __global const float *vertices, u
 // every comparison with them is false, so that no ray meets them and a hit always has a normal.
 static void write_face(__global TrianglePack *pack, uint lane_index, __global const int *faces,
                        __global const float *vertices, uint face) {
-    float vertex[3][3], normal[3];
-    for (uint corner = 0; corner < 3; corner++)
-        for (uint axis = 0; axis < 3; axis++)
-            vertex[corner][axis] = vertices[3 * (size_t)faces[3 * (size_t)face + corner] + axis];
-    const bool flat = !bvh_normal(vertex, normal);
-    for (uint i = 0; i < 9; i++)
-        pack->vertex[i][lane_index] = flat ? NAN : vertex[i / 3][i % 3];
+    Vec3 vertex[3];
+    for (uint corner = 0; corner < 3; corner++) {
+        __global const float *v = vertices + 3 * (size_t)faces[3 * (size_t)face + corner];
+        vertex[corner] = vec3(v[0], v[1], v[2]);
+    }
+    const bool flat = !(bvh_largest(bvh_normal(vertex[0], vertex[1], vertex[2])) > BVH_LEAST_NORMAL);
+    for (uint corner = 0; corner < 3; corner++) {
+        pack->vertex[3 * corner][lane_index] = flat ? NAN : vertex[corner].x;
+        pack->vertex[3 * corner + 1][lane_index] = flat ? NAN : vertex[corner].y;
+        pack->vertex[3 * corner + 2][lane_index] = flat ? NAN : vertex[corner].z;
+    }
     pack->face[lane_index] = face;
 }
 

@@ -31,13 +31,13 @@
 #define BVH_LIKELY(x) (x)
 #endif
 
-// PoCL keeps the variables of a kernel for each work-item of a group apart; those of a function that is
-// called lie in one place, and stay in the nearest cache.
-#ifdef INCPT_POCL
-#define BVH_CALL static __attribute__((noinline))
-#else
-#define BVH_CALL static inline
-#endif
+// Everything that rays can meet; trees and packs of all meshes stand one after the other.
+typedef struct {
+    __global const Node *top_nodes;
+    __global const Node *nodes;
+    __global const TrianglePack *packs;
+    __global const Object *objects;
+} Geometry;
 
 // A ray in the space of one tree, prepared for its tests. Axis z of the triangle test is the direction's
 // largest, x and y are the other two.
@@ -54,8 +54,7 @@ typedef struct {
 typedef struct {
     float distance;
     uint object;
-    uint pack; // counted from the first of the object
-    uint lane;
+    uint triangle;   // its place: pack, counted from the first of the object, times BVH_WIDTH, and lane
     float weight[3]; // of the corners, up to a common factor
 } BvhHit;
 
@@ -128,27 +127,20 @@ INLINE float bvh_scale(float x) {
     return as_float(0x7f000000 - (exponent < 0x7e800000 ? exponent : 0x7e800000));
 }
 
-INLINE float bvh_largest3(float x, float y, float z) { return MAX(MAX(FABS(x), FABS(y)), FABS(z)); }
+INLINE float bvh_largest(Vec3 v) { return MAX(MAX(FABS(v.x), FABS(v.y)), FABS(v.z)); }
 
-// Normal of a triangle by its winding, not of unit length. False where it has no area; the builder and the
-// hit agree on that, because both come here and nothing is contracted. Edges are scaled, without rounding,
-// because products of very short or long ones would leave the range of a float.
-INLINE bool bvh_normal(const float (*vertex)[3], float *normal) {
+// Normal of a triangle by its winding, not of unit length; what has an area has a component above
+// BVH_LEAST_NORMAL. The builder and the hit agree on that, because both come here and nothing is contracted.
+// Edges are scaled, without rounding, because products of very short or long ones would leave the range of a
+// float.
+#define BVH_LEAST_NORMAL 1e-30f
+INLINE Vec3 bvh_normal(Vec3 a, Vec3 b, Vec3 c) {
 #pragma OPENCL FP_CONTRACT OFF
-    float a[3], b[3];
-    for (uint i = 0; i < 3; i++) {
-        a[i] = vertex[1][i] - vertex[0][i];
-        b[i] = vertex[2][i] - vertex[0][i];
-    }
-    const float scale = bvh_scale(MAX(bvh_largest3(a[0], a[1], a[2]), bvh_largest3(b[0], b[1], b[2])));
-    for (uint i = 0; i < 3; i++) {
-        a[i] *= scale;
-        b[i] *= scale;
-    }
-    normal[0] = a[1] * b[2] - a[2] * b[1];
-    normal[1] = a[2] * b[0] - a[0] * b[2];
-    normal[2] = a[0] * b[1] - a[1] * b[0];
-    return bvh_largest3(normal[0], normal[1], normal[2]) > 1e-30f;
+    Vec3 ab = subtract(b, a), ac = subtract(c, a);
+    float scale = bvh_scale(MAX(bvh_largest(ab), bvh_largest(ac)));
+    ab = scaled(scale, ab);
+    ac = scaled(scale, ac);
+    return vec3(ab.y * ac.z - ab.z * ac.y, ab.z * ac.x - ab.x * ac.z, ab.x * ac.y - ab.y * ac.x);
 }
 
 #define BVH_VERTEX(pack, corner, axis) BVH_LOAD(pack, 3 * BVH_PLANE_BYTES * (corner) + (axis))
@@ -245,8 +237,7 @@ INLINE bool bvh_keep(uint pack, uint lanes, const float8 distance, const float8 
     if (!(distances[nearest] < hit->distance))
         return false;
     hit->distance = distances[nearest];
-    hit->pack = pack;
-    hit->lane = nearest;
+    hit->triangle = pack * BVH_WIDTH + nearest;
     for (uint i = 0; i < 3; i++)
         hit->weight[i] = ((const float *)&weight[i])[nearest];
     return true;
@@ -306,13 +297,10 @@ INLINE BvhRay bvh_object_ray(__global const Object *object, const float *origin,
 }
 
 // Nearest hit of the scene with 0 < t < hit->distance, else object is NO_INDEX; any one of them if `any`,
-// which fills nothing in. `origins` and `directions` are three planes each, `stride` apart.
-BVH_CALL bool bvh_trace(__global const float *origins, __global const float *directions, uint stride,
-                        __global const Node *top_nodes, __global const Node *nodes,
-                        __global const TrianglePack *packs, __global const Object *objects, const bool any,
-                        BvhHit *hit) {
-    const float origin[3] = {origins[0], origins[stride], origins[2 * stride]};
-    const float direction[3] = {directions[0], directions[stride], directions[2 * stride]};
+// which fills nothing in.
+INLINE bool bvh_trace(const Geometry *geometry, const float *origin, const float *direction, const bool any,
+                      BvhHit *hit) {
+    __global const Node *top_nodes = geometry->top_nodes;
     const BvhRay ray = bvh_ray(origin, direction);
     ulong stack[BVH_STACK_SIZE];
     uint height = 0, reference = 0;
@@ -326,14 +314,16 @@ BVH_CALL bool bvh_trace(__global const float *origins, __global const float *dir
                 continue;
             }
         } else {
-            __global const Object *object = objects + (reference & ~NODE_LEAF);
+            __global const Object *object = geometry->objects + (reference & ~NODE_LEAF);
             if (object->visible) {
                 const BvhRay object_ray = bvh_object_ray(object, origin, direction);
-                __global const Node *object_nodes = nodes + object->first_node;
-                if (bvh_trace_mesh(&object_ray, object_nodes, packs + object->first_pack, any, hit)) {
+                __global const Node *object_nodes = geometry->nodes + object->first_node;
+                __global const TrianglePack *object_packs = geometry->packs + object->first_pack;
+                if (bvh_trace_mesh(&object_ray, object_nodes, object_packs, any, hit)) {
                     if (any)
                         return true;
                     hit->object = reference & ~NODE_LEAF;
+                    hit->triangle += object->first_pack * BVH_WIDTH;
                 }
             }
         }

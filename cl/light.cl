@@ -10,6 +10,7 @@
 #endif
 
 typedef struct {
+    __global const Material *materials;
     __global const float *lights;      // planes of params.light_count triangles
     __global const float *image;       // environment, red, green, blue, row by row from +y
     __global const float *marginal;    // cumulative distribution of rows, height + 1
@@ -110,6 +111,10 @@ INLINE LightSample sample_environment(const Params *params, const Emitters *emit
 #endif
 
 #ifdef TRIANGLE_LIGHTS
+INLINE Vec3 light_vec3(__global const float *plane, uint stride, uint i) {
+    return vec3(plane[i], plane[stride + i], plane[2 * stride + i]);
+}
+
 // `choice` picks the triangle (Walker's alias method), `uv` the point on it.
 INLINE LightSample sample_triangle_light(const Params *params, const Emitters *emitters, Vec3 position,
                                          Uniform2 uv, float choice) {
@@ -121,9 +126,9 @@ INLINE LightSample sample_triangle_light(const Params *params, const Emitters *e
     uint light = scaled_choice - (float)cell < lights[LIGHT_ALIAS_PROBABILITY * stride + cell] ? cell : alias;
     float b1, b2;
     sample_triangle(uv.u, uv.v, &b1, &b2);
-    Vec3 vertex = load3(lights + LIGHT_VERTEX_X * stride, stride, light);
-    Vec3 edge_1 = load3(lights + LIGHT_EDGE_1_X * stride, stride, light);
-    Vec3 edge_2 = load3(lights + LIGHT_EDGE_2_X * stride, stride, light);
+    Vec3 vertex = light_vec3(lights + LIGHT_VERTEX_X * stride, stride, light);
+    Vec3 edge_1 = light_vec3(lights + LIGHT_EDGE_1_X * stride, stride, light);
+    Vec3 edge_2 = light_vec3(lights + LIGHT_EDGE_2_X * stride, stride, light);
     Vec3 point = add(vertex, add(scaled(b1, edge_1), scaled(b2, edge_2)));
     Vec3 normal = unit(outer(edge_1, edge_2));
     Vec3 to_light = subtract(point, position);
@@ -136,7 +141,7 @@ INLINE LightSample sample_triangle_light(const Params *params, const Emitters *e
     int shines = double_sided | (cosine > 0.0f);
     float facing = FABS(cosine);
     int valid = shines & (facing > 1e-7f) & (squared > 0.0f);
-    result.radiance = load3(lights + LIGHT_EMISSION_R * stride, stride, light);
+    result.radiance = light_vec3(lights + LIGHT_EMISSION_R * stride, stride, light);
     result.pdf = valid ? lights[LIGHT_PDF_AREA * stride + light] * squared / (valid ? facing : 1.0f) : 0.0f;
     return result;
 }

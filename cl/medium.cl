@@ -1,4 +1,4 @@
-#include "scalar.cl"
+#include "state.cl"
 
 // The stack of dielectrics that enclose a point: C. M. Schmidt and B. Budge, Simple Nested Dielectrics in
 // Ray Traced Images, JGT 7(2), 2002. It is sorted by priority; its first entry is the medium that is seen,
@@ -8,9 +8,9 @@ typedef struct {
     uint entry[MEDIUM_STACK_SIZE];
 } MediumStack;
 
-INLINE MediumStack load_medium_stack(__global const uint *path_bits, uint stride, uint path) {
-    uint low = path_bits[PATH_MEDIUM_0 * stride + path];
-    uint high = path_bits[PATH_MEDIUM_1 * stride + path];
+INLINE MediumStack load_medium_stack(const State *state, uint path) {
+    uint low = load_bits(state->paths, PATH_MEDIUM_0 * state->stride + path);
+    uint high = load_bits(state->paths, PATH_MEDIUM_1 * state->stride + path);
     MediumStack stack;
     stack.entry[0] = low & 0xffffu;
     stack.entry[1] = low >> 16;
@@ -19,9 +19,9 @@ INLINE MediumStack load_medium_stack(__global const uint *path_bits, uint stride
     return stack;
 }
 
-INLINE void store_medium_stack(__global uint *path_bits, uint stride, uint path, const MediumStack *stack) {
-    path_bits[PATH_MEDIUM_0 * stride + path] = stack->entry[0] | (stack->entry[1] << 16);
-    path_bits[PATH_MEDIUM_1 * stride + path] = stack->entry[2] | (stack->entry[3] << 16);
+INLINE void store_medium_stack(const State *state, uint path, const MediumStack *stack) {
+    store_bits(state->paths, PATH_MEDIUM_0 * state->stride + path, stack->entry[0] | (stack->entry[1] << 16));
+    store_bits(state->paths, PATH_MEDIUM_1 * state->stride + path, stack->entry[2] | (stack->entry[3] << 16));
 }
 
 // The higher wins; 0 is the highest of all.
@@ -62,9 +62,10 @@ INLINE float medium_ior(__global const Material *materials, uint medium) {
 
 // What a medium lets through over a distance in metres, which may be infinite (Beer and Lambert).
 INLINE Vec3 transmittance(__global const Material *materials, uint medium, float distance) {
-    if (medium == MEDIUM_NONE)
-        return vec3(1.0f, 1.0f, 1.0f);
-    __global const float *a = materials[medium].absorption;
-    return vec3(a[0] > 0.0f ? exp(-a[0] * distance) : 1.0f, a[1] > 0.0f ? exp(-a[1] * distance) : 1.0f,
-                a[2] > 0.0f ? exp(-a[2] * distance) : 1.0f);
+    int vacuum = medium == MEDIUM_NONE;
+    __global const float *a = materials[vacuum ? 0u : medium].absorption;
+    Vec3 depth = vec3(a[0] > 0.0f ? a[0] * distance : 0.0f, a[1] > 0.0f ? a[1] * distance : 0.0f,
+                      a[2] > 0.0f ? a[2] * distance : 0.0f);
+    depth = choose(vacuum, vec3(0.0f, 0.0f, 0.0f), depth);
+    return vec3(exp_negative(-depth.x), exp_negative(-depth.y), exp_negative(-depth.z));
 }

@@ -3,53 +3,45 @@
 // What happens where a ray ends on a transparent body, or inside one: absorption on the way, then the
 // boundary of nested dielectrics. A path that turns out to stand on an opaque surface is passed on to
 // `shade` by its class. Rarer and full of branches, so it stands apart from `shade` and is not vectorised.
-__kernel void medium_shade(const Params params, const uint count, __global const uint *list,
-                           __global const Material *materials, __global const float *hits,
-                           __global float *rays, __global float *paths, __global float *shadows,
-                           __global float *radiance) {
-    uint stride = params.path_stride;
-    uint item = (uint)get_global_id(0);
-    if (item >= count)
-        return;
-    uint path = list[item];
-    uint result = params.first_path + path;
-    __global uint *bits = (__global uint *)paths;
-    uint hit_material = ((__global const uint *)hits)[HIT_MATERIAL * stride + path];
+INLINE void shade_medium_path(const Params *params, __global const Material *materials, const State *state,
+                              uint path, uint result) {
+    uint stride = state->stride;
+    uint hit_material = load_bits(state->hits, HIT_MATERIAL * stride + path);
     __global const Material *material = &materials[hit_material];
-    Vec3 direction = load3(rays + RAY_DIRECTION_X * stride, stride, path);
-    Vec3 position = load3(hits + HIT_POSITION_X * stride, stride, path);
-    Vec3 geometric = load3(hits + HIT_GEOMETRIC_X * stride, stride, path);
-    Vec3 shading = load3(hits + HIT_SHADING_X * stride, stride, path);
-    float distance = hits[HIT_DISTANCE * stride + path];
-    float offset = hits[HIT_OFFSET * stride + path];
-    Vec3 throughput = load3(paths + PATH_THROUGHPUT_R * stride, stride, path);
-    float bsdf_pdf = paths[PATH_BSDF_PDF * stride + path];
-    uint counts = bits[PATH_COUNTS * stride + path];
+    Vec3 direction = load3(state->rays + RAY_DIRECTION_X * stride, stride, path);
+    Vec3 position = load3(state->hits + HIT_POSITION_X * stride, stride, path);
+    Vec3 geometric = load3(state->hits + HIT_GEOMETRIC_X * stride, stride, path);
+    Vec3 shading = load3(state->hits + HIT_SHADING_X * stride, stride, path);
+    float distance = state->hits[HIT_DISTANCE * stride + path];
+    float offset = state->hits[HIT_OFFSET * stride + path];
+    Vec3 throughput = load3(state->paths + PATH_THROUGHPUT_R * stride, stride, path);
+    float bsdf_pdf = state->paths[PATH_BSDF_PDF * stride + path];
+    uint counts = load_bits(state->paths, PATH_COUNTS * stride + path);
     uint bounces = counts & 0xffu, passages = (counts >> 8) & 0xffu, ray = (counts >> 16) & 0xffu;
-    uint seed = pixel_seed(bits[PATH_PIXEL * stride + path], params.seed);
-    uint sample = bits[PATH_SAMPLE * stride + path];
+    uint seed = pixel_seed(load_bits(state->paths, PATH_PIXEL * stride + path), params->seed);
+    uint sample = load_bits(state->paths, PATH_SAMPLE * stride + path);
 
     // Absorption on the way here.
-    MediumStack before = load_medium_stack(bits, stride, path);
+    MediumStack before = load_medium_stack(state, path);
     throughput = times(throughput, transmittance(materials, before.entry[0], distance));
-    store3(paths + PATH_THROUGHPUT_R * stride, stride, path, throughput);
+    store3(state->paths + PATH_THROUGHPUT_R * stride, stride, path, throughput);
 
     // Opaque, or taken for opaque by chance where the material is partly transmissive.
     Uniform2 luck = uniform_2d(seed, sample, PAIR_LUCK(ray));
     if (luck.v >= material->transmission) {
 #ifdef LIGHT_SAMPLING
         // `shade` knows no media: the light that its shadow ray will bring is absorbed beforehand.
-        Vec3 passed = transmittance(materials, before.entry[0], shadows[SHADOW_DISTANCE * stride + path]);
-        Vec3 light = load3(shadows + SHADOW_RADIANCE_R * stride, stride, path);
-        store3(shadows + SHADOW_RADIANCE_R * stride, stride, path, times(passed, light));
+        Vec3 passed =
+            transmittance(materials, before.entry[0], state->shadows[SHADOW_DISTANCE * stride + path]);
+        Vec3 light = load3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path);
+        store3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path, times(passed, light));
 #endif
-        bits[PATH_CLASS * stride + path] = CLASS_SURFACE;
+        store_bits(state->paths, PATH_CLASS * stride + path, CLASS_SURFACE);
         return;
     }
     float facing = -inner(geometric, direction);
-    Vec3 gathered = load3(radiance, params.buffer_stride, result);
     Vec3 emitted = emitted_radiance(material, facing, distance, bsdf_pdf);
-    store3(radiance, params.buffer_stride, result, add(gathered, times(throughput, emitted)));
+    gather(state, result, times(throughput, emitted));
 
     // The media on both sides. A ray that leaves a body which it never entered started inside of it.
     MediumStack after = before;
@@ -82,21 +74,21 @@ __kernel void medium_shade(const Params params, const uint count, __global const
 
     // Light sampling, where a rough boundary has a density for it.
 #ifdef LIGHT_SAMPLING
-    if (!covered && !smooth && bounces <= params.max_bounces) {
-        Vec3 to_light = load3(shadows + SHADOW_DIRECTION_X * stride, stride, path);
-        float light_pdf = shadows[SHADOW_PDF * stride + path];
+    if (!covered && !smooth && bounces <= params->max_bounces) {
+        Vec3 to_light = load3(state->shadows + SHADOW_DIRECTION_X * stride, stride, path);
+        float light_pdf = state->shadows[SHADOW_PDF * stride + path];
         Vec3 wi = to_local(frame, to_light);
         BsdfValue value = eval_rough_boundary(&boundary, wo, wi);
         float above = inner(geometric, to_light);
         if (light_pdf > 0.0f && value.pdf > 0.0f && above * wi.z > 0.0f) {
-            Vec3 arriving = load3(shadows + SHADOW_RADIANCE_R * stride, stride, path);
+            Vec3 arriving = load3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path);
             float weight = mis_weight(light_pdf, value.pdf) / light_pdf;
             arriving = times(times(throughput, value.f_cos), scaled(weight, arriving));
             arriving = times(arriving, transmittance(materials, above > 0.0f ? near : far,
-                                                     shadows[SHADOW_DISTANCE * stride + path]));
-            store3(shadows + SHADOW_ORIGIN_X * stride, stride, path,
+                                                     state->shadows[SHADOW_DISTANCE * stride + path]));
+            store3(state->shadows + SHADOW_ORIGIN_X * stride, stride, path,
                    along(position, above > 0.0f ? offset : -offset, geometric));
-            store3(shadows + SHADOW_RADIANCE_R * stride, stride, path, arriving);
+            store3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path, arriving);
             path_class |= CLASS_SHADOW;
         }
     }
@@ -122,17 +114,30 @@ __kernel void medium_shade(const Params params, const uint count, __global const
     bounces += !covered && !passage;
     passages += !covered && passage;
     throughput = times(throughput, next.weight);
-    float survival = survival_probability(throughput, counts & 0xffu, params.roulette_depth);
-    int goes_on = possible && bounces <= params.max_bounces + 1u && passages <= params.transmission_bounces &&
-                  ray < 250u && largest(throughput) > 0.0f && luck.u < survival;
+    float survival = survival_probability(throughput, counts & 0xffu, params->roulette_depth);
+    int goes_on = possible && bounces <= params->max_bounces + 1u &&
+                  passages <= params->transmission_bounces && ray < 250u && largest(throughput) > 0.0f &&
+                  luck.u < survival;
 
     if (!reflected)
-        store_medium_stack(bits, stride, path, &after);
-    store3(rays + RAY_ORIGIN_X * stride, stride, path,
+        store_medium_stack(state, path, &after);
+    store3(state->rays + RAY_ORIGIN_X * stride, stride, path,
            along(position, reflected ? offset : -offset, geometric));
-    store3(rays + RAY_DIRECTION_X * stride, stride, path, next_direction);
-    store3(paths + PATH_THROUGHPUT_R * stride, stride, path, scaled(1.0f / survival, throughput));
-    paths[PATH_BSDF_PDF * stride + path] = next.pdf;
-    bits[PATH_COUNTS * stride + path] = bounces | (passages << 8) | ((ray + 1u) << 16);
-    bits[PATH_CLASS * stride + path] = path_class | (goes_on ? CLASS_LIVE : 0u);
+    store3(state->rays + RAY_DIRECTION_X * stride, stride, path, next_direction);
+    store3(state->paths + PATH_THROUGHPUT_R * stride, stride, path, scaled(1.0f / survival, throughput));
+    state->paths[PATH_BSDF_PDF * stride + path] = next.pdf;
+    store_bits(state->paths, PATH_COUNTS * stride + path, bounces | (passages << 8) | ((ray + 1u) << 16));
+    store_bits(state->paths, PATH_CLASS * stride + path, path_class | (goes_on ? CLASS_LIVE : 0u));
 }
+
+#ifndef BLOCKS
+__kernel void medium_shade(const Params params, const uint count, __global const uint *list,
+                           __global const Material *materials, __global float *hits, __global float *rays,
+                           __global float *paths, __global float *shadows, __global float *radiance) {
+    State state = {rays, paths, hits, shadows, radiance, params.path_stride, params.buffer_stride};
+    if (get_global_id(0) >= count)
+        return;
+    uint path = list[get_global_id(0)];
+    shade_medium_path(&params, materials, &state, path, params.first_path + path);
+}
+#endif

@@ -57,15 +57,6 @@ INLINE Vec3 unit(Vec3 a) { return scaled(1.0f / SQRT(inner(a, a)), a); }
 INLINE float largest(Vec3 a) { return MAX(MAX(a.x, a.y), a.z); }
 INLINE float luminance(Vec3 c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
 
-INLINE Vec3 load3(__global const float *plane, uint stride, uint i) {
-    return vec3(plane[i], plane[stride + i], plane[2 * stride + i]);
-}
-INLINE void store3(__global float *plane, uint stride, uint i, Vec3 v) {
-    plane[i] = v.x;
-    plane[stride + i] = v.y;
-    plane[2 * stride + i] = v.z;
-}
-
 INLINE uint reverse_bits(uint x) {
     x = (x << 16) | (x >> 16);
     x = ((x & 0x00ff00ffu) << 8) | ((x & 0xff00ff00u) >> 8);
@@ -105,4 +96,17 @@ INLINE float atan2_turns(float y, float x) {
     angle = ay > ax ? 0.25f - angle : angle;
     angle = x < 0.0f ? 0.5f - angle : angle;
     return y < 0.0f ? -angle : angle;
+}
+
+// exp(x) for x <= 0, relative error below 2e-7; 0 where a float has no exponent left. 2^n times a polynomial
+// of the fraction (S. Moshier's, Cephes).
+INLINE float exp_negative(float x) {
+    float y = MAX(x, -87.0f);
+    float n = FLOOR(y * 1.44269504f + 0.5f);
+    float r = (y - n * 0.693359375f) - n * -2.12194440e-4f;
+    float p =
+        5.0000001201e-1f +
+        r * (1.6666665459e-1f +
+             r * (4.1665795894e-2f + r * (8.3334519073e-3f + r * (1.3981999507e-3f + r * 1.9875691500e-4f))));
+    return x < -87.0f ? 0.0f : (1.0f + r + r * r * p) * as_float(((int)n + 127) << 23);
 }

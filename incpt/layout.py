@@ -34,6 +34,9 @@ NO_INDEX = 0xFFFFFFFF
 WORK_GROUP_SIZE = 64
 """Work-items per group of the path kernels; lists of paths are padded to a multiple of it."""
 
+BLOCK_PATHS = 512
+"""Paths that one work-item of `trace_blocks` takes from start to end: their state fits into a cache."""
+
 COMPACT_BLOCK = 64
 """Paths that one work-item of `compact` looks at: few atomics, and enough work-items for a GPU."""
 
@@ -95,6 +98,7 @@ class PathPlane(IntEnum):
     light sampling could not have found (camera ray, smooth dielectric), whose emission counts whole.
     COUNTS packs scattering events (bits 0..7), dielectric passages (8..15) and rays (16..23).
     MEDIUM_0 and MEDIUM_1 hold the stack of enclosing dielectrics, four 16-bit material indices.
+    RESULT is the place among the block's paths that was the path's first (trace_blocks.cl alone).
     """
 
     THROUGHPUT_R = 0
@@ -106,7 +110,8 @@ class PathPlane(IntEnum):
     COUNTS = 6
     MEDIUM_0 = 7
     MEDIUM_1 = 8
-    CLASS = 9
+    RESULT = 9
+    CLASS = 10
 
 
 class ShadowPlane(IntEnum):

@@ -33,6 +33,7 @@ class Wavefront:
 
     def __init__(self, device: Device) -> None:
         self.device = device
+        self.in_blocks = device.is_pocl and device.is_cpu
         self.chunk_paths = device.tuning.chunk_paths
         # The last place is a scratch path, which idle lanes of a group read and write.
         self.stride = self.chunk_paths + layout.WORK_GROUP_SIZE
@@ -58,6 +59,9 @@ class Wavefront:
     ) -> None:
         """Trace `path_count` paths, those of `slots` in order; `radiance` holds what each brings, as three
         planes of params["buffer_stride"] floats."""
+        if self.in_blocks:
+            self._trace_blocks(scene, params, slots, path_count, radiance)
+            return
         for first in range(0, path_count, self.chunk_paths):
             chunk = self._chunk_params(params, first, path_count)
             count = self._generate(chunk, slots, radiance)
@@ -65,6 +69,26 @@ class Wavefront:
                 if count == 0:
                     break
                 count = self._bounce(scene, chunk, ray, count, radiance)
+
+    def _trace_blocks(
+        self,
+        scene: DeviceScene,
+        params: npt.NDArray[np.void],
+        slots: cl.Buffer,
+        path_count: int,
+        radiance: cl.Buffer,
+    ) -> None:
+        whole = params.copy()
+        whole["path_count"] = path_count
+        kernel = self.device.kernel(
+            "trace_blocks", features=(*scene.features, *(("MEDIA",) if scene.has_media else ()))
+        )
+        planes = (layout.RayPlane, layout.PathPlane, layout.HitPlane, layout.ShadowPlane)
+        local = [cl.LocalMemory(4 * n * layout.BLOCK_PATHS) for n in (*map(len, planes), 3, 1, 1)]
+        self.device.launch(
+            kernel, -(-path_count // layout.BLOCK_PATHS), whole, slots, *scene.geometry,
+            scene.buffer("normals"), scene.buffer("layers"), *scene.emitters, *local, radiance, work_group=1,
+        )  # fmt: skip
 
     def first_hits(
         self,

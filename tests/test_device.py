@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
+import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -160,6 +159,18 @@ def test_two_devices_in_a_process_build_the_same_source(device: Device) -> None:
     assert Device(0).program_text("shade") == device.program_text("shade")
 
 
+def test_blocks_and_wavefront_agree(device: Device) -> None:
+    """The kernel that traces blocks of paths on CPUs, and the wavefront of all other devices."""
+    images = []
+    for in_blocks in (False, True):
+        session = Session(mixed_scene(base_nor=8), device=device)
+        session._wavefront.in_blocks = in_blocks
+        session.render(8)
+        images.append(session.image())
+    assert np.median(np.abs(images[0] - images[1])) < 1e-5
+    assert images[0].mean() == pytest.approx(images[1].mean(), rel=1e-3)
+
+
 def test_devices_agree(device: Device) -> None:
     """Every device makes the same picture, within rounding; where there is one only, with itself."""
     session = Session(mixed_scene(base_nor=16), device=device)
@@ -171,81 +182,44 @@ def test_devices_agree(device: Device) -> None:
         assert np.median(difference) < 1e-4 and abs(other.image().mean() / session.image().mean() - 1) < 0.01
 
 
-VECTORIZED = """
-import sys
-import numpy as np
-from incpt import layout
-from incpt.device import Device
-
-device = Device()
-floats = device.upload(np.zeros(1 << 18, np.float32))
-slots = np.zeros(64, layout.SLOT)
-slots["group_count"] = 1
-params = np.zeros((), layout.PARAMS)
-params["path_stride"] = params["buffer_stride"] = 1000
-for name in ("light_count", "environment_width", "environment_height", "tile_size", "width", "height"):
-    params[name] = 4
-for variant in {variants!r}:
-    name, *features = variant.split()
-    print("VARIANT", variant, file=sys.stderr, flush=True)
-    kernel = device.kernel(name, features=tuple(features))
-    first = (device.upload(slots),) if name == "generate" else (np.uint32(512),)
-    device.launch(kernel, 512, params, *first, *[floats] * (kernel.num_args - 2))
-    device.finish()
-"""
-VARIANTS = [
-    "generate",
-    "escape",
-    "escape ENVIRONMENT_IMAGE",
-    "illuminate ENVIRONMENT_IMAGE",
-    "illuminate TRIANGLE_LIGHTS",
-    "illuminate ENVIRONMENT_IMAGE TRIANGLE_LIGHTS",
-    "shade",
-    "shade TRIANGLE_LIGHTS",
-    "shade EMISSION_ONLY",
-]
+LIGHTS = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS")
+VARIANTS = [lights + media for lights in ((), LIGHTS[:1], LIGHTS[1:], LIGHTS) for media in ((), ("MEDIA",))]
 
 
-def has_avx512() -> bool:
-    info = Path("/proc/cpuinfo")
-    return info.exists() and "avx512vl" in info.read_text()
+def remarks_on_vectorisation(device: Device, text: str) -> list[str]:
+    program = cl.Program(device.context, text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", cl.CompilerWarning)
+        program.build(options=device_module._BUILD_OPTIONS)
+    log = program.get_build_info(device.cl_device, cl.program_build_info.LOG)
+    return [line for line in log.splitlines() if "not vectorized" in line]
 
 
-@pytest.mark.skipif(not has_avx512(), reason="LLVM 14's vectoriser was tuned and seen with AVX-512 only")
-def test_pocl_runs_shading_in_simd_lanes(device: Device, tmp_path: Path) -> None:
-    """What most paths take is vectorised over work-items, eight wide; the compiler's remarks say so."""
+@pytest.mark.parametrize("features", VARIANTS, ids=lambda features: " ".join(features) or "plain")
+def test_pocl_runs_shading_in_simd_lanes(device: Device, features: tuple[str, ...]) -> None:
+    """Every loop over a block that asks for SIMD lanes gets them; the compiler warns where it cannot."""
     if not device.is_pocl:
         pytest.skip("PoCL's compiler is the one that needs it")
-    environment = {
-        **os.environ,
-        "POCL_VECTORIZER_REMARKS": "1",
-        "POCL_CACHE_DIR": str(tmp_path),
-        "PYOPENCL_NO_CACHE": "1",
-        DEVICE_VARIABLE: "Portable",
-    }
-    script = VECTORIZED.format(variants=VARIANTS)
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        check=True,
-    )
-    parts = done.stdout.decode(errors="replace").split("VARIANT ")[1:]
-    remarks = dict(part.split("\n", 1) for part in parts)
-    assert list(remarks) == VARIANTS
-    for variant, text in remarks.items():
-        assert "vectorized loop (vectorization width: 8" in text, variant
+    text = device.program_text("trace_blocks", features)
+    assert remarks_on_vectorisation(device, text) == []
+
+
+def test_loops_that_pocl_cannot_vectorise_are_noticed(device: Device) -> None:
+    if not device.is_pocl:
+        pytest.skip("PoCL's compiler is the one that needs it")
+    text = device.program_text("trace_blocks")
+    called = re.sub(r"#define SQRT\(x\) .*", "#define SQRT(x) sqrt(x)", text)
+    assert called != text
+    assert remarks_on_vectorisation(device, called) != []
 
 
 def test_kernels_build_without_warnings(device: Device) -> None:
-    lights = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS")
-    variants = [(), lights[:1], lights[1:], lights, ("EMISSION_ONLY",), ("MEDIA",)]
+    variants = [*VARIANTS, ("EMISSION_ONLY",)]
     for file in sorted(path.stem for path in (Path(layout.__file__).parent.parent / "cl").glob("*.cl")):
         if "__kernel" not in source(file):
             continue
         for features in variants if "LIGHT_SAMPLING" in source(file) else [()]:
-            if file == "illuminate" and not set(features) & set(lights):
+            if file == "illuminate" and not set(features) & set(LIGHTS):
                 continue  # launched only where there is something to sample
             program = cl.Program(device.context, device.program_text(file, features))
             program.build(options=["-Werror"])

@@ -1,0 +1,56 @@
+#include "bvh.cl"
+#include "state.cl"
+
+// The rays of paths: the nearest hit of one, and whether anything is in the way of another.
+
+// PoCL keeps the variables of a kernel for each work-item of a group apart; those of a function that is
+// called lie in one place, and stay in the nearest cache.
+#ifdef INCPT_POCL
+#define TRACE_CALL static __attribute__((noinline))
+#else
+#define TRACE_CALL static inline
+#endif
+
+// Leaves the nearest hit of a path's ray in the hit `slot`, as far as `describe_path` needs it. False, and
+// object NO_INDEX, where the ray leaves the scene.
+TRACE_CALL bool trace_path(const Geometry *geometry, const State *state, uint path, uint slot) {
+    const uint stride = state->stride;
+    STATE const float *ray = state->rays + path;
+    const float origin[3] = {ray[RAY_ORIGIN_X * stride], ray[RAY_ORIGIN_Y * stride],
+                             ray[RAY_ORIGIN_Z * stride]};
+    const float direction[3] = {ray[RAY_DIRECTION_X * stride], ray[RAY_DIRECTION_Y * stride],
+                                ray[RAY_DIRECTION_Z * stride]};
+    BvhHit hit;
+    hit.distance = INFINITY;
+    bvh_trace(geometry, origin, direction, false, &hit);
+    STATE float *hits = state->hits + slot;
+    hits[HIT_DISTANCE * stride] = hit.distance;
+    hits[HIT_OBJECT * stride] = as_float(hit.object);
+    if (hit.object == NO_INDEX)
+        return false;
+    hits[HIT_TRIANGLE * stride] = as_float(hit.triangle);
+    for (uint i = 0; i < 3; i++)
+        hits[(HIT_POSITION_X + i) * stride] = hit.weight[i];
+    return true;
+}
+
+// Which shading kernel a path that has hit something waits for.
+INLINE uint surface_class(__global const Material *materials, const State *state, uint path) {
+    const bool in_medium = load_bits(state->paths, PATH_MEDIUM_0 * state->stride + path) != NO_INDEX;
+    const uint material = load_bits(state->hits, HIT_MATERIAL * state->stride + path);
+    const bool transmissive = materials[material].flags & MATERIAL_TRANSMISSIVE;
+    return in_medium || transmissive ? CLASS_MEDIUM : CLASS_SURFACE;
+}
+
+// Whether anything is in the way of a path's shadow ray.
+TRACE_CALL bool is_occluded(const Geometry *geometry, const State *state, uint path) {
+    const uint stride = state->stride;
+    STATE const float *shadow = state->shadows + path;
+    const float origin[3] = {shadow[SHADOW_ORIGIN_X * stride], shadow[SHADOW_ORIGIN_Y * stride],
+                             shadow[SHADOW_ORIGIN_Z * stride]};
+    const float direction[3] = {shadow[SHADOW_DIRECTION_X * stride], shadow[SHADOW_DIRECTION_Y * stride],
+                                shadow[SHADOW_DIRECTION_Z * stride]};
+    BvhHit hit;
+    hit.distance = shadow[SHADOW_DISTANCE * stride];
+    return bvh_trace(geometry, origin, direction, true, &hit);
+}
