@@ -14,7 +14,7 @@ from incpt.ui import camera_moves, clipboard, objects
 from incpt.ui.dialogs import About, Choice, PathDialog, Question, TextField
 from incpt.ui.document import Document, collected_warnings
 from incpt.ui.editor import Editor
-from incpt.ui.renderer import Export, Pin, Restart
+from incpt.ui.renderer import Export, Pin
 from incpt.ui.selection import Selection
 
 SCENE_FILES = ("Scenes", (".toml",))
@@ -302,7 +302,7 @@ def switch_pause(editor: Editor) -> None:
 
 def restart(editor: Editor) -> None:
     """Throw the picture away and render it from nothing."""
-    editor.renderer.request(Restart())
+    editor.restart()
 
 
 def pin(editor: Editor) -> None:

@@ -34,8 +34,7 @@ class App:
         self.window = Window(kept.window_size, "incpt", preferences.layout_path(), kept.ui_scale)
         implot.create_context()
         self.display = Display(self.window.context)
-        self.renderer = ThreadedRenderer(device, self.window.wake)
-        self.editor = Editor(document, self.renderer, kept)
+        self.editor = Editor(document, self._open_renderer, kept, device)
         self.editor.start_over(document, opened)
         self.workspace = Workspace()
         self.viewport = Viewport()
@@ -45,7 +44,7 @@ class App:
         self._rect: Rect = (0.0, 0.0, 1.0, 1.0)
         self._shown_frame: object = None
         self._kept = kept
-        self.renderer.show(self.editor.view)
+        self.editor.renderer.show(self.editor.view)
         self._offer_recovery()
 
     def run(self) -> None:
@@ -91,7 +90,7 @@ class App:
 
     def close(self) -> None:
         """Stop the renderer, keep the preferences, close the window."""
-        self.renderer.close()
+        self.editor.renderer.close()
         self.recovery.remove()
         self.editor.preferences = self.editor.preferences.with_window_size(*self.window.size)
         self._keep_preferences()
@@ -106,6 +105,9 @@ class App:
         self.frame(is_swapped=False)
         flat = np.frombuffer(self.window.context.screen.read(components=3, alignment=1), np.uint8)
         return flat.reshape(height, width, 3)[::-1]
+
+    def _open_renderer(self, device: str | None) -> ThreadedRenderer:
+        return ThreadedRenderer(device, self.window.wake)
 
     def _draw_below(self) -> None:
         pixels = imgui.get_io().display_framebuffer_scale.x

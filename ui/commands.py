@@ -24,7 +24,8 @@ MENUS = ("File", "Edit", "Object", "View", "Render", "Help")
 @dataclass(frozen=True)
 class Command:
     """`menu` may name a submenu after a slash; a line is drawn in menus where `group` changes. `keys` such
-    as "Ctrl+Shift+S"; `plain_keys` where the plain set differs. `checked` for what is on or off."""
+    as "Ctrl+Shift+S"; `plain_keys` where the plain set differs. `checked` for what is on or off;
+    `detail` stands behind the name in menus: what would be undone."""
 
     name: str
     menu: str
@@ -33,6 +34,7 @@ class Command:
     plain_keys: str | None = None
     enabled: Test | None = None
     checked: Test | None = None
+    detail: Callable[[Editor], str | None] | None = None
     group: int = 0
     help: str = ""
 
@@ -127,9 +129,10 @@ COMMANDS: tuple[Command, ...] = (
             help="Put the picture, as shown, on the clipboard"),
     Command("Quit", "File", actions.quit_, "Ctrl+Q", group=3, help="Close the editor"),
     Command("Undo", "Edit", Editor.undo, "Ctrl+Z", enabled=lambda e: e.document.history.can_undo,
-            help="Take the last edit back"),
+            detail=lambda e: e.document.history.undo_label, help="Take the last edit back"),
     Command("Redo", "Edit", Editor.redo, "Ctrl+Shift+Z", plain_keys="Ctrl+Y",
-            enabled=lambda e: e.document.history.can_redo, help="Do it again"),
+            enabled=lambda e: e.document.history.can_redo, detail=lambda e: e.document.history.redo_label,
+            help="Do it again"),
     Command("Select all", "Edit", actions.select_all, "A", plain_keys="Ctrl+A", enabled=_has_objects, group=1,
             help="Select every visible object"),
     Command("Select none", "Edit", Editor.cancel, "Escape", group=1,

@@ -19,8 +19,8 @@ from incpt.live import Frame, View
 from incpt.scene import Scene
 from incpt.ui.document import Document
 from incpt.ui.messages import Messages
-from incpt.ui.preferences import DisplaySettings, Preferences
-from incpt.ui.renderer import Building, Exported, Picked, Problem, Renderer
+from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
+from incpt.ui.renderer import Building, Exported, Picked, Problem, Renderer, Restart
 from incpt.ui.selection import Selection
 
 if TYPE_CHECKING:
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 ZOOM_REST_SECONDS = 0.4
 """Turns of the wheel closer together than this are one entry of the history."""
+
+
+OpenRenderer = Callable[[str | None], Renderer]
 
 
 @dataclass(frozen=True)
@@ -40,17 +43,21 @@ class Tool:
 
 
 class Editor:
-    """Everything between the user and the renderer. `now` is a clock in seconds."""
+    """Everything between the user and the renderer. `open_renderer` makes one for a device, given by name or
+    None for the default; `now` is a clock in seconds."""
 
     def __init__(
         self,
         document: Document,
-        renderer: Renderer,
+        open_renderer: OpenRenderer,
         preferences: Preferences,
+        device: str | None = None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         self.document = document
-        self.renderer = renderer
+        self.device = device
+        self._open_renderer = open_renderer
+        self.renderer = open_renderer(device)
         self.preferences = preferences
         self.now = now
         self.selection = Selection()
@@ -70,6 +77,7 @@ class Editor:
         self.is_flying = False
         self._hold_until = 0.0
         self._is_held = False
+        self._has_cancelled = False
 
     # ---------------------------------------------------------------------------------- the scene
 
@@ -118,8 +126,14 @@ class Editor:
         if self.document.history.before is not None:
             self.document.history.cancel()
             self._hold_until = 0.0
+            self._has_cancelled = True
         elif self.selection:
             self.select(Selection())
+
+    def take_cancelled(self) -> bool:
+        """Whether a drag was given up since the last call: whoever holds it lets go."""
+        has_cancelled, self._has_cancelled = self._has_cancelled, False
+        return has_cancelled
 
     def select(self, selection: Selection) -> None:
         """Another selection; not an edit."""
@@ -153,6 +167,11 @@ class Editor:
         if display != self.preferences.display:
             self.preferences = replace(self.preferences, display=display)
 
+    def change_snap(self, snap: SnapSettings) -> None:
+        """Other steps of the gizmo."""
+        if snap != self.preferences.snap:
+            self.preferences = replace(self.preferences, snap=snap)
+
     def choose_navigation(self, navigation: str) -> None:
         """One of the two sets of keys and moves of the mouse."""
         if navigation != self.preferences.navigation:
@@ -169,6 +188,20 @@ class Editor:
         )
         if changed != self.preferences:
             self.preferences = changed
+
+    def restart(self) -> None:
+        """Render the picture from nothing; where the device failed, open it again first."""
+        if self.device_failed:
+            self.change_device(self.device)
+        else:
+            self.renderer.request(Restart())
+
+    def change_device(self, device: str | None) -> None:
+        """Render on another device from now on. The last picture stays until that one has one."""
+        self.renderer.close()
+        self.device, self.device_failed, self.is_pinned = device, False, False
+        self.renderer = self._open_renderer(device)
+        self.renderer.show(self.view)
 
     # ----------------------------------------------------------------------------------- one frame
 

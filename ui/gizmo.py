@@ -44,6 +44,7 @@ class Gizmo:
 
     def __init__(self) -> None:
         self._drag: _Drag | None = None
+        self._is_given_up = False
         self.is_using = False
         self.is_over = False
 
@@ -73,13 +74,16 @@ class Gizmo:
         _note_place(view, projection, matrix, rect)
         return self._follow(scene, visible, matrix, np.array(flat.values, np.float64).reshape(4, 4).T)
 
-    def cancel(self) -> None:
-        """Forget the drag; the next one starts from where the objects are."""
+    def give_up(self) -> None:
+        """Do nothing more until the handle is let go."""
         self._drag = None
+        self._is_given_up = self.is_using
 
     def _follow(self, scene: Scene, names: tuple[str, ...], old: Matrix, new: Matrix) -> Scene:
         self.is_using, self.is_over = _gizmo.is_using(), _gizmo.is_over()
         if not self.is_using:
+            self._is_given_up = False
+        if not self.is_using or self._is_given_up:
             self._drag = None
             return scene
         if self._drag is None:

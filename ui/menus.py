@@ -87,7 +87,9 @@ def _draw_commands(editor: Editor, commands: list[Command]) -> None:
     for one in commands:
         is_checked = one.checked is not None and one.checked(editor)
         keys = one.keys_in(editor.preferences.navigation)
-        pressed, _ = imgui.menu_item(one.name, keys, is_checked, one.is_enabled(editor))
+        detail = one.detail(editor) if one.detail is not None else None
+        label = f"{one.name} {detail}###{one.name}" if detail else one.name
+        pressed, _ = imgui.menu_item(label, keys, is_checked, one.is_enabled(editor))
         places.note(one.name)
         if one.help and imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
             imgui.set_tooltip(one.help)

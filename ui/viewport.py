@@ -62,6 +62,8 @@ class Viewport:
         places.note_rect(
             "picture", (picture[0], picture[1], picture[0] + picture[2], picture[1] + picture[3])
         )
+        if editor.take_cancelled():
+            self._let_go()
         self._use_gizmo(editor, picture)
         self._use_bar(editor, picture)
         self._use_mouse(editor, picture)
@@ -94,20 +96,19 @@ class Viewport:
             scale=scale,
         )
 
+    def _let_go(self) -> None:
+        imgui.internal.clear_active_id()
+        self.gizmo.give_up()
+        self._press = None
+
     # ----------------------------------------------------------------------------------- the gizmo
 
     def _use_gizmo(self, editor: Editor, picture: Rect) -> None:
-        history = editor.document.history
-        if self.gizmo.is_using and history.before is None and self._was_cancelled(editor):
-            self.gizmo.cancel()
         tool = editor.tool
         scene = self.gizmo.draw(
             editor.scene, editor.selection.names, tool.operation, tool.space, editor.preferences.snap, picture
         )
         editor.propose(scene, tool.operation.capitalize(), "gizmo")
-
-    def _was_cancelled(self, editor: Editor) -> bool:
-        return imgui.is_key_pressed(imgui.Key.escape, False)
 
     # -------------------------------------------------------------------------------- the split's bar
 

@@ -6,15 +6,15 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
+from incpt.device import all_devices, device_name
 from incpt.scene import Object, Scene
 from incpt.ui import actions, dialogs, menus, objects, places, widgets
 from incpt.ui.commands import OVERLAY_NAMES
 from incpt.ui.editor import Editor
 from incpt.ui.panels import display as display_panel
 from incpt.ui.panels import material as material_panel
-from incpt.ui.panels import notices, outliner, plots, render, scene_panel, transform
+from incpt.ui.panels import notices, outliner, plots, render, scene_panel, tool, transform
 from incpt.ui.panels.plots import Records
-from incpt.ui.renderer import Restart
 from incpt.ui.widgets import Refusals
 
 _RIGHT_SHARE, _OUTLINER_SHARE = 0.25, 0.28
@@ -27,6 +27,7 @@ class Workspace:
         self.records = Records()
         self._search = ""
         self._is_uniform = True
+        self._devices: list[str] | None = None
         self._is_laid_out = False
         self._shows_first_tab = False
 
@@ -94,6 +95,10 @@ class Workspace:
             return
         if count > 1:
             widgets.note(f"{count} objects are selected; the fields show this one.")
+        with widgets.section("Gizmo", is_open=False) as is_open:
+            if is_open:
+                editor.tool, snap = tool.draw(editor.tool, editor.preferences.snap)
+                editor.change_snap(snap)
         refusals = Refusals()
         obj = editor.scene.object(name)
         with widgets.section("Transform") as is_open:
@@ -145,6 +150,7 @@ class Workspace:
 
     def _draw_render(self, editor: Editor) -> None:
         render.draw_state(editor.frame)
+        self._draw_device(editor)
         imgui.separator()
         preferences = editor.preferences
         control = render.Control(
@@ -154,7 +160,7 @@ class Workspace:
         new, is_restart = render.draw_control(control)
         editor.steer(new)
         if is_restart:
-            editor.renderer.request(Restart())
+            editor.restart()
         refusals = Refusals()
         with widgets.section("Settings of the scene") as is_open:
             if is_open:
@@ -162,6 +168,14 @@ class Workspace:
                 if settings is not editor.scene.settings:
                     editor.propose(replace(editor.scene, settings=settings), "Render settings", _key())
         widgets.show_refusals(refusals)
+
+    def _draw_device(self, editor: Editor) -> None:
+        if self._devices is None and editor.frame is not None:
+            self._devices = [device_name(one) for one in all_devices()]
+        current = editor.frame.device if editor.frame is not None else ""
+        chosen = render.draw_device(self._devices or [current], current)
+        if chosen is not None:
+            editor.change_device(chosen)
 
     def _draw_method(self, editor: Editor) -> None:
         with widgets.section("Display") as is_open:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -46,7 +47,6 @@ def draw_state(frame: Frame | None) -> None:
     widgets.value_row("Size", f"{width} × {height}" + (" (preview)" if frame.is_preview else ""))
     widgets.value_row("Speed", f"{frame.paths_per_second / 1e6:.2f} million paths/s")
     widgets.value_row("Step", f"{frame.step_seconds * 1e3:.1f} ms")
-    widgets.value_row("Device", frame.device)
     if frame.nonfinite:
         widgets.value_row("Not finite", f"{frame.nonfinite:,} samples", "They count as black")
 
@@ -58,6 +58,12 @@ def _draw_progress(picture: Picture, is_resting: bool) -> None:
     done, total = picture.queue_done, len(picture.queue)
     imgui.progress_bar(done / max(total, 1), imgui.ImVec2(-1, 0), f"{done:,} of {total:,} tiles")
     places.note("queue")
+
+
+def draw_device(devices: Sequence[str], current: str) -> str | None:
+    """The device that renders; another one where the user chose it."""
+    chosen = widgets.choice("Device", current, [(name, name) for name in devices], "OpenCL device")
+    return chosen if chosen != current else None
 
 
 def draw_control(control: Control) -> tuple[Control, bool]:
