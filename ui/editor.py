@@ -19,6 +19,7 @@ from incpt.live import Frame, View
 from incpt.scene import Scene
 from incpt.ui.document import Document
 from incpt.ui.messages import Messages
+from incpt.ui.overlays import NEEDS_AOVS
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
 from incpt.ui.renderer import Building, Exported, Picked, Problem, Renderer, Restart
 from incpt.ui.selection import Selection
@@ -159,7 +160,7 @@ class Editor:
             step_ms=self.preferences.step_ms,
             drag_nor=self.preferences.drag_nor,
             split=display.split,
-            aovs=display.overlay in ("object_ids", "normals", "albedo", "depth"),
+            aovs=display.overlay in NEEDS_AOVS,
         )
 
     def change_display(self, display: DisplaySettings) -> None:
