@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 PROGRAMS = ("Xvfb", "xdotool")
 INSTALL = "apt install xvfb xdotool libgl1 libgl1-mesa-dri"
 _START_SECONDS = 20.0
+_TYPED_AT_ONCE = 12
 _KEY_SECONDS = 0.02
 """Between key down and up: a tap without it falls between two frames."""
 
@@ -105,6 +106,13 @@ class Hand:
         left, top, right, bottom = self.place("picture")
         return left + x * (right - left), top + y * (bottom - top)
 
+    def show_tab(self, name: str) -> None:
+        """Bring the panel of that name to the front by a click on its tab."""
+        from imgui_bundle import imgui
+
+        tab = imgui.internal.find_window_by_name(name).dc.dock_tab_item_rect
+        self.click(((tab.min.x + tab.max.x) / 2, (tab.min.y + tab.max.y) / 2))
+
     def move(self, at: tuple[float, float]) -> None:
         """The mouse to that place."""
         _xdotool("mousemove", str(round(at[0])), str(round(at[1])))
@@ -161,8 +169,8 @@ class Hand:
 
     def type(self, text: str) -> None:
         """Type a text into what has the focus."""
-        for character in text:
-            _xdotool("type", "--delay", "15", "--", character)
+        for start in range(0, len(text), _TYPED_AT_ONCE):
+            _xdotool("type", "--delay", "4", "--", text[start : start + _TYPED_AT_ONCE])
             self.pump(frames=2)
 
     def type_into(self, name: str, text: str) -> None:
@@ -171,6 +179,11 @@ class Hand:
         self.key("ctrl+a")
         self.type(text)
         self.key("Return")
+
+    def close_window(self) -> None:
+        """Ask the window to close, as its button in a title bar does."""
+        _xdotool("search", "--name", r" - incpt$", "windowquit")
+        self.pump(frames=4)
 
     def screenshot(self, path: Path | None = None) -> npt.NDArray[np.uint8]:
         """(H, W, 3) what the window shows now, row 0 on top; also written as PNG where a path is given."""

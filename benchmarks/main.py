@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import typer
 
-from incpt.benchmarks import sweep
+from incpt.benchmarks import rays, sweep
 from incpt.benchmarks.experiment import Stopped
 from incpt.benchmarks.peers import compare
 
@@ -24,6 +24,7 @@ app = typer.Typer(
 
 # A new command is a line here.
 app.command("sweep")(sweep.sweep)
+app.command("rays")(rays.rays)
 app.command("peers")(compare.peers)
 
 

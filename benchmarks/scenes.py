@@ -183,13 +183,13 @@ def icosphere(subdivisions: int) -> Mesh:
 def wavy_sphere(subdivisions: int) -> Mesh:
     """A sphere of radius about 0.6 with 20 * 4^subdivisions flat triangles, displaced by waves."""
     ball = icosphere(subdivisions)
-    return Mesh(_displaced(ball.vertices.astype(np.float64)), ball.faces)
+    return Mesh(_displaced(ball.vertices), ball.faces)
 
 
-def _displaced(directions: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    x, y, z = directions.T
+def _displaced(directions: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    x, y, z = directions.T.astype(np.float64)
     height = 0.05 * np.sin(9 * x + 2 * z) * np.sin(8 * y) + 0.02 * np.sin(31 * x) * np.sin(29 * y + 23 * z)
-    return directions * (0.6 + height)[:, None]
+    return np.asarray(directions * (0.6 + height)[:, None], np.float32)
 
 
 @cache
@@ -202,7 +202,7 @@ def terrain(triangles: int) -> Mesh:
     corner = (np.arange(edge)[:, None] * (edge + 1) + np.arange(edge)).ravel()
     quads = np.stack([corner, corner + edge + 1, corner + edge + 2, corner + 1], axis=1)
     faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    return Mesh(np.stack([x, y, z], axis=1), faces)
+    return Mesh(np.stack([x, y, z], axis=1).astype(np.float32), faces)
 
 
 def crowd(count: int, mesh: Mesh | None = None) -> Scene:

@@ -25,6 +25,7 @@ from incpt.layout import MIN_ALPHA
 from incpt.scene import Camera, Material, Vector
 
 _OVERHEAD_SPP = 2
+_ATTEMPTS = 3
 _MOST_BOUNCES = 1024
 
 
@@ -65,8 +66,12 @@ class CyclesPeer:
 
     def time(self, spp: int, seed: int) -> float:
         # Both with the same seed; whatever a render takes beside its samples cancels.
-        least = self._render(_OVERHEAD_SPP, seed)
-        return self._render(_OVERHEAD_SPP + spp, seed) - least
+        for _ in range(_ATTEMPTS):
+            least = self._render(_OVERHEAD_SPP, seed)
+            seconds = self._render(_OVERHEAD_SPP + spp, seed) - least
+            if seconds > 0:
+                return seconds
+        raise RuntimeError(f"{spp} samples cannot be told from its start; use more --seconds")
 
     def image(self, spp: int, seed: int) -> FloatImage:
         self._render(spp, seed)

@@ -107,7 +107,7 @@ def emitter(environment: Environment) -> dict[str, Any]:
     the rows and one more hold exactly what we interpolate."""
     if environment.image is None:
         return {"type": "constant", "radiance": {"type": "rgb", "value": list(environment.radiance)}}
-    pixels = environment.image.pixels * np.float32(environment.radiance)
+    pixels = environment.image.pixels * np.array(environment.radiance, np.float32)
     padded = np.concatenate([pixels[:1], pixels, pixels[-1:]])
     rows = np.empty((2 * len(pixels) + 1, *pixels.shape[1:]), np.float32)
     rows[1::2], rows[0::2] = pixels, (padded[:-1] + padded[1:]) / 2
