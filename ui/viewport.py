@@ -45,6 +45,7 @@ class Viewport:
 
     def __init__(self) -> None:
         self.gizmo = Gizmo()
+        self._held_by_gizmo: tuple[int, tuple[str, ...]] = (0, ())
         self._press: _Press | None = None
         self._holds_bar = False
         self._is_flying = False
@@ -104,11 +105,14 @@ class Viewport:
     # ----------------------------------------------------------------------------------- the gizmo
 
     def _use_gizmo(self, editor: Editor, picture: Rect) -> None:
+        if self.gizmo.is_using and self._held_by_gizmo != (id(editor.scene), editor.selection.names):
+            self.gizmo.give_up()  # undone, edited or deselected under the drag
         tool = editor.tool
         scene = self.gizmo.draw(
             editor.scene, editor.selection.names, tool.operation, tool.space, editor.preferences.snap, picture
         )
         editor.propose(scene, tool.operation.capitalize(), "gizmo")
+        self._held_by_gizmo = id(editor.scene), editor.selection.names
 
     # -------------------------------------------------------------------------------- the split's bar
 

@@ -18,6 +18,7 @@ from incpt.ui.panels.plots import Records
 from incpt.ui.widgets import Refusals
 
 _RIGHT_SHARE, _OUTLINER_SHARE = 0.25, 0.28
+_WIDGET = "widget "
 
 
 class Workspace:
@@ -105,9 +106,9 @@ class Workspace:
             if is_open:
                 new, self._is_uniform = transform.draw(obj, self._is_uniform, refusals)
                 if new is not obj:
-                    editor.propose(_with_object(editor.scene, name, new), "Transform", _key())
+                    editor.propose(_with_object(editor.scene, name, new), "Transform", _key(editor))
         self._draw_material(editor, name, refusals)
-        widgets.show_refusals(refusals)
+        _tell(editor, refusals)
 
     def _draw_material(self, editor: Editor, name: str, refusals: Refusals) -> None:
         scene = editor.scene
@@ -120,7 +121,7 @@ class Workspace:
             new = material_panel.draw(scene.materials[material], refusals)
         if new is not scene.materials[material]:
             materials = {**scene.materials, material: new}
-            editor.propose(replace(scene, materials=materials), f"Material {material}", _key())
+            editor.propose(replace(scene, materials=materials), f"Material {material}", _key(editor))
         editor.attempt(lambda: _apply_material_outcome(editor, material, outcome))
 
     def _draw_scene(self, editor: Editor) -> None:
@@ -130,7 +131,7 @@ class Workspace:
             if is_open:
                 camera = scene_panel.draw_camera(scene.camera, refusals)
                 if camera is not scene.camera:
-                    editor.propose(replace(scene, camera=camera), "Camera", _key())
+                    editor.propose(replace(scene, camera=camera), "Camera", _key(editor))
                 if widgets.button("Frame selected##camera"):
                     actions.frame_selected(editor)
                 widgets.same_line()
@@ -141,12 +142,12 @@ class Workspace:
             if is_open:
                 environment, asked = scene_panel.draw_environment(scene.environment, refusals)
                 if environment is not scene.environment:
-                    editor.propose(replace(scene, environment=environment), "Environment", _key())
+                    editor.propose(replace(scene, environment=environment), "Environment", _key(editor))
                 if asked.is_choose:
                     actions.choose_environment(editor)
                 if asked.is_remove:
                     editor.propose(editor.scene.with_environment(image=None), "Remove image")
-        widgets.show_refusals(refusals)
+        _tell(editor, refusals)
 
     def _draw_render(self, editor: Editor) -> None:
         render.draw_state(editor.frame)
@@ -166,8 +167,8 @@ class Workspace:
             if is_open:
                 settings = render.draw_settings(editor.scene.settings, refusals)
                 if settings is not editor.scene.settings:
-                    editor.propose(replace(editor.scene, settings=settings), "Render settings", _key())
-        widgets.show_refusals(refusals)
+                    editor.propose(replace(editor.scene, settings=settings), "Render settings", _key(editor))
+        _tell(editor, refusals)
 
     def _draw_device(self, editor: Editor) -> None:
         if self._devices is None and editor.frame is not None:
@@ -208,9 +209,19 @@ def _lay_out(root: int) -> None:
     builder.dock_builder_finish(root)
 
 
-def _key() -> str:
-    """What the edits of one drag or one typing have in common: the widget that is active."""
-    return f"widget {imgui.internal.get_active_id()}"
+def _key(editor: Editor) -> str:
+    """What the edits of one drag or one typing have in common: the widget that is active. Escape takes the
+    activity away before the widget gives its old value back, which belongs to the same entry."""
+    active, under_way = imgui.internal.get_active_id(), editor.document.history.key
+    if active == 0 and under_way is not None and under_way.startswith(_WIDGET):
+        return under_way
+    return f"{_WIDGET}{active}"
+
+
+def _tell(editor: Editor, refusals: Refusals) -> None:
+    # Not in the panel: a field refuses in one frame only, and the panel may be scrolled.
+    for message in refusals.messages:
+        editor.messages.add(message, "warning")
 
 
 def _with_object(scene: Scene, name: str, new: Object) -> Scene:
