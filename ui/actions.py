@@ -63,7 +63,7 @@ def save_as(editor: Editor, then: Callable[[], object] | None = None) -> None:
         if then is not None:
             then()
 
-    _ask_path(editor, "Save as", SCENE_FILES, True, write)
+    _ask_path(editor, "Save as", SCENE_FILES, True, write, f"{_stem(editor)}.toml")
 
 
 def _save_to(editor: Editor, path: Path) -> None:
@@ -92,7 +92,9 @@ def drop(editor: Editor, path: Path) -> None:
 
 def export_picture(editor: Editor) -> None:
     """Ask for a place and write the picture there."""
-    _ask_path(editor, "Export picture", PICTURES, True, lambda path: export_to(editor, path))
+    _ask_path(
+        editor, "Export picture", PICTURES, True, lambda path: export_to(editor, path), f"{_stem(editor)}.png"
+    )
 
 
 def export_to(editor: Editor, path: Path) -> None:
@@ -146,9 +148,14 @@ def _ask_path(
     kind: tuple[str, tuple[str, ...]],
     is_saving: bool,
     then: Callable[[Path], object],
+    name: str = "",
 ) -> None:
     start = editor.document.path.parent if editor.document.path is not None else Path.cwd()
-    editor.dialog = PathDialog(title, kind, is_saving, start, then)
+    editor.dialog = PathDialog(title, kind, is_saving, start, then, name)
+
+
+def _stem(editor: Editor) -> str:
+    return editor.document.name.removesuffix(".toml")
 
 
 # --------------------------------------------------------------------------------------- selection, tool
@@ -199,11 +206,9 @@ def rename(editor: Editor) -> None:
 
 def rename_to(editor: Editor, old: str, new_name: str) -> None:
     """Give an object another name."""
-    editor.propose(
-        objects.rename(editor.scene, old, new_name),
-        "Rename",
-        selection=editor.selection.renamed(old, new_name),
-    )
+    scene = objects.rename(editor.scene, old, new_name)
+    given = scene.objects[editor.scene.object_index[old]].name
+    editor.propose(scene, "Rename", selection=editor.selection.renamed(old, given))
 
 
 def hide(editor: Editor) -> None:

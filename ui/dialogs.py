@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 from collections.abc import Callable, Sequence
@@ -12,7 +13,9 @@ from typing import TYPE_CHECKING, Protocol
 from imgui_bundle import imgui
 from imgui_bundle import portable_file_dialogs as native
 
+from incpt.errors import InputError
 from incpt.ui import places, theme, widgets
+from incpt.ui.document import absolute_path
 
 if TYPE_CHECKING:
     from incpt.ui.commands import Command
@@ -97,7 +100,7 @@ class TextField:
 
 class PathDialog:
     """Asks for a file: by the system's own dialog where there is one, else by a path field with the files
-    of the folder below it. `kind` is a name with the suffixes that fit."""
+    of the folder below it. `kind` is a name with the suffixes that fit; `name` a file to propose."""
 
     def __init__(
         self,
@@ -106,9 +109,10 @@ class PathDialog:
         is_saving: bool,
         folder: Path,
         then: Callable[[Path], object],
+        name: str = "",
     ) -> None:
         self.title, self.kind, self.is_saving, self.then = title, kind, is_saving, then
-        self.text = f"{folder}/"
+        self.text = f"{folder}/{name}".replace("//", "/")
         self._native = _native_dialog(title, kind, is_saving, folder) if _has_native_dialogs() else None
 
     def draw(self, editor: Editor) -> None:
@@ -136,14 +140,38 @@ class PathDialog:
         if chosen == 1:
             close(editor, self)
         elif chosen == 0:
-            path = Path(self.text).expanduser()
             close(editor, self)
-            # A path that is refused is asked for again; the message says why.
-            if not editor.attempt(lambda: self.then(path)) and editor.dialog is None:
-                editor.dialog = self
+            self._use(editor, lambda: self._take(editor))
+
+    def _use(self, editor: Editor, action: Callable[[], object]) -> None:
+        # A path that is refused is asked for again; the message says why.
+        if not editor.attempt(action) and editor.dialog is None:
+            editor.dialog = self
+
+    def _take(self, editor: Editor) -> None:
+        path = absolute_path(self.text)
+        if not self.text.strip() or os.path.isdir(path):
+            self.text = f"{path}/".replace("//", "/")
+            raise InputError(f"{path}: is a folder; name a file in it")
+        if self.is_saving and not path.suffix and len(self.kind[1]) == 1:
+            path = path.with_name(path.name + self.kind[1][0])
+        if not (self.is_saving and os.path.exists(path)):
+            self.then(path)
+            return
+
+        def ask_again() -> None:
+            editor.dialog = self
+
+        replace = Choice("Replace", lambda: self._use(editor, lambda: self.then(path)))
+        editor.dialog = Question(
+            "Replace file", f"{path.name} is there already.", (replace, Choice("Cancel", ask_again))
+        )
 
     def _draw_folder(self) -> None:
-        typed = Path(self.text).expanduser()
+        try:
+            typed = absolute_path(self.text)
+        except InputError:
+            typed = Path(self.text)
         folder = typed if self.text.endswith("/") else typed.parent
         imgui.text_disabled(f"{self.kind[0]} in {folder}")
         if imgui.begin_child(
@@ -151,6 +179,7 @@ class PathDialog:
         ):
             if imgui.selectable("../", False)[0]:
                 self.text = f"{folder.parent}/".replace("//", "/")
+            places.note("../")
             for name in _entries(folder, self.kind[1]):
                 if imgui.selectable(name, name == typed.name)[0]:
                     self.text = str(folder / name) + ("/" if name.endswith("/") else "")
@@ -245,8 +274,9 @@ def _entries(folder: Path, suffixes: tuple[str, ...]) -> list[str]:
     except OSError:
         return []
     seen = [path for path in found if not path.name.startswith(".")]
-    folders = [f"{path.name}/" for path in seen if path.is_dir()]
-    return folders + [path.name for path in seen if path.suffix.lower() in suffixes and path.is_file()]
+    # os.path, because Path.is_dir raises where a folder may be listed and not entered.
+    folders = [f"{path.name}/" for path in seen if os.path.isdir(path)]
+    return folders + [path.name for path in seen if path.suffix.lower() in suffixes and os.path.isfile(path)]
 
 
 def _has_native_dialogs() -> bool:
