@@ -76,9 +76,12 @@ def number(
 def whole_number(label: str, value: int, *, low: int, high: int, speed: float = 0.1, tip: str = "") -> int:
     """A whole number to drag or to type, held between `low` and `high`."""
     with row(label, tip) as field:
-        _, result = imgui.drag_int(field, value, speed, low, high, "%d", imgui.SliderFlags_.always_clamp)
+        # A file may hold numbers that the widget does not offer, or that imgui's 32 bits do not.
+        shown = min(max(value, -(1 << 31)), (1 << 31) - 1)
+        flags = imgui.SliderFlags_.always_clamp
+        changed, result = imgui.drag_int(field, shown, speed, low, high, "%d", flags)
         places.note(label)
-    return result
+    return result if changed else value
 
 
 def vector(
