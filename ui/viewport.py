@@ -22,6 +22,8 @@ from incpt.ui.selection import Selection
 Rect = tuple[float, float, float, float]
 """Left, top, width, height in points."""
 
+_ANY_WINDOW = imgui.HoveredFlags_.any_window
+_ANY_POPUP = imgui.PopupFlags_.any_popup
 _BAR_POINTS = 6.0
 """How near the mouse has to be to take the bar of the split view."""
 _NUMBERS_MARGIN = 4.0
@@ -146,17 +148,17 @@ class Viewport:
             self._hold_press(editor, self._press, mouse, picture)
 
     def _begin_press(self, editor: Editor, mouse: tuple[float, float]) -> None:
-        if not self._is_free(editor) or self._holds_bar:
+        if self._holds_bar:
             return
         navigation = editor.preferences.navigation
         for index, button in enumerate((Button.LEFT, Button.RIGHT, Button.MIDDLE)):
-            if imgui.is_mouse_clicked(index):
+            if imgui.is_mouse_clicked(index) and self._is_free(editor, button):
                 action = bindings.action_for(navigation, button, _modifiers())
                 click = bindings.click_action(button, _modifiers())
                 self._press = _Press(index, mouse, mouse, action, click)
                 self._drags += 1
                 return
-        if imgui.is_key_pressed(imgui.Key.grave_accent, False) and not imgui.get_io().want_text_input:
+        if imgui.is_key_pressed(imgui.Key.grave_accent, False) and self._is_free(editor, Button.GRAVE):
             self._is_flying = bindings.action_for(navigation, Button.GRAVE, _modifiers()) is Action.FLY
             self._last_mouse = mouse
             self._drags += 1
@@ -197,7 +199,7 @@ class Viewport:
 
     def _use_wheel(self, editor: Editor, picture: Rect) -> None:
         turns = imgui.get_io().mouse_wheel
-        if not turns or not self._is_free(editor):
+        if not turns or not self._is_free(editor, Button.WHEEL):
             return
         if bindings.action_for(editor.preferences.navigation, Button.WHEEL, _modifiers()) is Action.ZOOM:
             cursor = _mouse()[0] - picture[0], _mouse()[1] - picture[1]
@@ -205,10 +207,16 @@ class Viewport:
             scene = replace(editor.scene, camera=camera)
             editor.propose(scene, "Zoom", "zoom", rest_seconds=ZOOM_REST_SECONDS)
 
-    def _is_free(self, editor: Editor) -> bool:
-        """Whether the mouse belongs to the picture: to no panel, no dialog, no handle of the gizmo."""
-        io = imgui.get_io()
-        return not (io.want_capture_mouse or self.gizmo.is_using or self.gizmo.is_over or editor.dialog)
+    def _is_free(self, editor: Editor, button: Button = Button.LEFT) -> bool:
+        """Whether the mouse belongs to the picture: to no panel, no menu, no dialog, and no handle of the
+        gizmo, which takes the left button only."""
+        if self.gizmo.is_using or editor.dialog is not None:
+            return False
+        if button is Button.LEFT:
+            return not (imgui.get_io().want_capture_mouse or self.gizmo.is_over)
+        # Not want_capture_mouse, which a handle under the mouse sets too.
+        is_over_panel = imgui.is_window_hovered(_ANY_WINDOW) or imgui.is_any_item_active()
+        return not (is_over_panel or imgui.is_popup_open("", _ANY_POPUP))
 
 
 def picture_rect(rect: Rect, size: tuple[int, int]) -> Rect:
