@@ -6,6 +6,7 @@ so nothing sleeps on a guess. Tests, the soak and the pictures of the documentat
 
 from __future__ import annotations
 
+import ctypes
 import os
 import shutil
 import subprocess
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 PROGRAMS = ("Xvfb", "xdotool")
 INSTALL = "apt install xvfb xdotool libgl1 libgl1-mesa-dri"
 _START_SECONDS = 20.0
+_CLIENT_MESSAGE = 33
+"""Type of the event, from X.h."""
 _TYPED_AT_ONCE = 12
 _KEY_SECONDS = 0.02
 """Between key down and up: a tap without it falls between two frames."""
@@ -182,7 +185,9 @@ class Hand:
 
     def close_window(self) -> None:
         """Ask the window to close, as its button in a title bar does."""
-        _xdotool("search", "--name", r" - incpt$", "windowquit")
+        import glfw
+
+        ask_to_close(glfw.get_x11_window(self.app.window.handle))
         self.pump(frames=4)
 
     def screenshot(self, path: Path | None = None) -> npt.NDArray[np.uint8]:
@@ -201,6 +206,39 @@ class Hand:
         messages = [message.text for message in editor.messages.current()]
         mode = editor.frame.pictures[-1].mode if editor.frame is not None else None
         return f"mode {mode}, selection {editor.selection.names}, messages {messages}"
+
+
+class _ClientMessage(ctypes.Structure):
+    """XClientMessageEvent, in the room of an XEvent."""
+
+    _fields_ = (
+        ("type", ctypes.c_int),
+        ("serial", ctypes.c_ulong),
+        ("send_event", ctypes.c_int),
+        ("display", ctypes.c_void_p),
+        ("window", ctypes.c_ulong),
+        ("message_type", ctypes.c_ulong),
+        ("format", ctypes.c_int),
+        ("values", ctypes.c_long * 5),
+        ("room", ctypes.c_long * 12),
+    )
+
+
+def ask_to_close(window: int) -> None:
+    """Send the window with that X id what a window manager sends when its close button is pressed. xdotool
+    cannot in the versions that distributions still ship."""
+    x11 = ctypes.CDLL("libX11.so.6")
+    x11.XOpenDisplay.restype = ctypes.c_void_p
+    x11.XInternAtom.restype = ctypes.c_ulong
+    display = ctypes.c_void_p(x11.XOpenDisplay(None))
+    protocols, delete = (
+        x11.XInternAtom(display, name, False) for name in (b"WM_PROTOCOLS", b"WM_DELETE_WINDOW")
+    )
+    message = _ClientMessage(type=_CLIENT_MESSAGE, window=window, message_type=protocols, format=32)
+    message.values[0] = delete
+    x11.XSendEvent(display, ctypes.c_ulong(window), False, ctypes.c_long(0), ctypes.byref(message))
+    x11.XSync(display, False)
+    x11.XCloseDisplay(display)
 
 
 def _xdotool(*arguments: str) -> None:

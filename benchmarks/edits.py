@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from incpt import tiles
+from incpt.benchmarks.content import digest
 from incpt.benchmarks.pictures import FloatImage, Gallery, errors
 from incpt.device import Device
 from incpt.edit_script import Edit
@@ -141,6 +142,30 @@ class EditBench:
             self._session = Session(start.scene, settings=start.settings, device=self.device)
         self._session.restore(start)
         return self._session
+
+
+_NAMED = ("size", "tile_size", "strategy", "nor")
+
+
+def edit_subject(
+    bench: EditBench, edit: Edit, settings: RenderSettings, marks: Marks, repetition: int
+) -> dict[str, Any]:
+    """What a measured edit depends on."""
+    others = {n: getattr(settings, n) for n in RenderSettings.names() if n not in _NAMED}
+    return {
+        "scene": digest(bench.scene),
+        "edit": edit.label,
+        "edited": digest(edit.apply(bench.scene), edit.pixel),
+        "size": list(settings.size),
+        "tile_size": settings.tile_size,
+        "strategy": settings.strategy,
+        "nor": None if settings.strategy == "restart" else settings.nor,  # restarting does not use it
+        **others,
+        "base_spp": bench.base_spp,
+        "reference_spp": bench.reference_spp,
+        "marks": [*marks.steps, *(f"{s:g} s" for s in marks.seconds), *(["done"] if marks.done else [])],
+        "repetition": repetition,
+    }
 
 
 def _timed(

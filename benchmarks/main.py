@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import typer
 
-from incpt.benchmarks import rays, sweep
+from incpt.benchmarks import build, rays, scale, sweep, table51
 from incpt.benchmarks.experiment import Stopped
 from incpt.benchmarks.peers import compare
 
@@ -24,8 +24,11 @@ app = typer.Typer(
 
 # A new command is a line here.
 app.command("sweep")(sweep.sweep)
+app.command("table51")(table51.table51)
 app.command("rays")(rays.rays)
 app.command("peers")(compare.peers)
+app.command("build")(build.build)
+app.command("scale")(scale.scale)
 
 
 @app.callback()

@@ -205,6 +205,7 @@ def terrain(triangles: int) -> Mesh:
     return Mesh(np.stack([x, y, z], axis=1).astype(np.float32), faces)
 
 
+@cache
 def crowd(count: int, mesh: Mesh | None = None) -> Scene:
     """`count` instances of a mesh (a cube by default) on a floor, in a square of 4 m, under a sky."""
     body = mesh or shape("cube")
@@ -225,6 +226,7 @@ def crowd(count: int, mesh: Mesh | None = None) -> Scene:
     return Scene(Camera((0, 2.5, 4.5), (0, 0, 0), fov_y=45), sky, materials, (floor, *objects))
 
 
+@cache
 def lanterns(count: int) -> Scene:
     """The Cornell box with its lamp cut into `count` panes of the same power together."""
     box = cornell()

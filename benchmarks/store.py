@@ -3,7 +3,7 @@
 A file holds lines of two kinds, `{"environment": {...}}`, which later lines refer to by its id, and
 
     {"key": ..., "subject": {...}, "environment": id, "at": ..., "load": {...}, "values": {...},
-     "rows": [...]}
+     "rows": [...], "command": ...}
 
 `subject` says what was measured, with every setting that matters; `values` what came out; `rows` holds
 figures that there are several of (errors at steps). A line is written at once, so that an interruption leaves
@@ -25,6 +25,7 @@ from typing import Any
 
 from incpt import files
 from incpt.benchmarks.content import digest
+from incpt.benchmarks.environment import command_line
 from incpt.errors import InputError, InputWarning, OutputError
 
 Row = dict[str, Any]
@@ -41,6 +42,7 @@ class Record:
     load: Row
     values: Row
     rows: tuple[Row, ...] = ()
+    command: str = ""
 
     @property
     def busy(self) -> bool:
@@ -101,6 +103,7 @@ class Store:
         record = Record(
             self.key(subject, environment), subject, environment["id"],
             datetime.now(UTC).isoformat(timespec="seconds"), load, values, tuple(rows),
+            command_line(),
         )  # fmt: skip
         lines = []
         if environment["id"] not in self._environments:
@@ -178,6 +181,7 @@ def to_csv(results: Results) -> str:
         environment = {k: v for k, v in results.environments.get(record.environment, {}).items() if k != "id"}
         for row in record.rows or ({},):
             merged = {**record.subject, **row, **record.values, **record.load, "at": record.at, **environment}
+            merged["command"] = record.command
             table.append({name: _flat(value) for name, value in merged.items()})
     columns = list(dict.fromkeys(name for row in table for name in row))
     text = io.StringIO()

@@ -17,8 +17,7 @@ from rich.table import Table
 
 from incpt import scene_io
 from incpt.benchmarks import environment, experiment, options
-from incpt.benchmarks.content import digest
-from incpt.benchmarks.edits import EditBench, Marks, Timeline
+from incpt.benchmarks.edits import EditBench, Marks, Timeline, edit_subject
 from incpt.benchmarks.experiment import Outcome, Task, Work
 from incpt.benchmarks.pictures import Gallery
 from incpt.benchmarks.store import Results, Store, grouped
@@ -97,21 +96,7 @@ def _task(bench: EditBench, case: Case, grid: Grid, repetition: int) -> Task:
     # Only once to the end of the queue: with NoR 512 that takes as long as 512 pictures.
     marks = replace(grid.marks, done=grid.marks.done and repetition == 0)
     settings = case.settings
-    subject = {
-        "scene": digest(bench.scene),
-        "edit": case.edit.label,
-        "edited": digest(case.edit.apply(bench.scene), case.edit.pixel),
-        "tile_size": settings.tile_size,
-        "strategy": case.variant.strategy,
-        # Restarting does not use it.
-        "nor": None if case.variant.strategy == "restart" else case.variant.nor,
-        **{n: getattr(settings, n) for n in RenderSettings.names() if n not in _VARIED},
-        "base_spp": grid.base_spp,
-        "reference_spp": grid.reference_spp,
-        "marks": [*marks.steps, *(f"{s:g} s" for s in marks.seconds), *(["done"] if marks.done else [])],
-        "repetition": repetition,
-    }
-    subject["size"] = list(settings.size)
+    subject = edit_subject(bench, case.edit, settings, marks, repetition)
 
     def measure(work: Work) -> Outcome:
         def note(fraction: float) -> None:
@@ -124,9 +109,6 @@ def _task(bench: EditBench, case: Case, grid: Grid, repetition: int) -> Task:
 
     weight = max((*marks.steps, 1)) + 4 * max((*marks.seconds, 0.0))
     return Task(case.label, subject, measure, weight + (case.variant.nor if marks.done else 0))
-
-
-_VARIED = ("size", "tile_size", "strategy", "nor")
 
 
 def table(results: Results) -> Table:

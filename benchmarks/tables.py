@@ -18,6 +18,9 @@ def print_table(tables: Table | Sequence[Table], results: Results, store: Store)
     console = Console()
     wide = console if console.is_terminal else Console(width=WIDTH)
     for table in [tables] if isinstance(tables, Table) else tables:
+        # A title of the table would be folded to its width.
+        title, table.title = table.title, None
+        wide.print(title or "", markup=False, style="bold")
         wide.print(table)
     for line in notes(results):
         wide.print(line, markup=False)
