@@ -76,7 +76,7 @@ trace_blocks(const Params params, __global const Slot *slots, __global const Nod
     const Emitters emitters = {
         materials, lights, environment_image, environment_marginal, environment_conditional, environment_pdf};
     const uint first = (uint)get_group_id(0) * BLOCK_PATHS;
-    const uint size = MIN(params.path_count - first, BLOCK_PATHS);
+    const uint size = first < params.path_count ? MIN(params.path_count - first, BLOCK_PATHS) : 0;
     __local uint *results = (__local uint *)paths + PATH_RESULT * BLOCK_PATHS;
 
     LANES

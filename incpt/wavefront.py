@@ -80,13 +80,14 @@ class Wavefront:
     ) -> None:
         whole = params.copy()
         whole["path_count"] = path_count
+        blocks = max(-(-path_count // layout.BLOCK_PATHS), self._least_size)
         kernel = self.device.kernel(
             "trace_blocks", features=(*scene.features, *(("MEDIA",) if scene.has_media else ()))
         )
         planes = (layout.RayPlane, layout.PathPlane, layout.HitPlane, layout.ShadowPlane)
         local = [cl.LocalMemory(4 * n * layout.BLOCK_PATHS) for n in (*map(len, planes), 3, 1, 1)]
         self.device.launch(
-            kernel, -(-path_count // layout.BLOCK_PATHS), whole, slots, *scene.geometry,
+            kernel, blocks, whole, slots, *scene.geometry,
             scene.buffer("normals"), scene.buffer("layers"), *scene.emitters, *local, radiance, work_group=1,
         )  # fmt: skip
 
@@ -118,16 +119,21 @@ class Wavefront:
         stages: list[Callable[[], object]] = [
             partial(self._generate, chunk, slots, radiance),
             partial(self._intersect, scene, chunk, 0),
-            partial(self._illuminate, scene, chunk, 0, self._surfaces),
-            partial(self._shade, scene, chunk, 0, radiance),
-            partial(self._occlude, scene, chunk, 0, radiance),
             partial(self._describe, scene, chunk, np.uint32(0), nothing, nothing),
-            partial(self._escape, scene, chunk, 0, radiance),
         ]
-        if scene.has_media:
-            stages.append(partial(self._shade_media, scene, chunk, 0, radiance))
+        if self.in_blocks:
+            stages.append(partial(self._trace_blocks, scene, params, slots, 0, radiance))
         else:
-            stages.append(partial(self._shade, scene, chunk, 0, radiance, last=True))
+            stages += [
+                partial(self._illuminate, scene, chunk, 0, self._surfaces),
+                partial(self._shade, scene, chunk, 0, radiance),
+                partial(self._occlude, scene, chunk, 0, radiance),
+                partial(self._escape, scene, chunk, 0, radiance),
+            ]
+            if scene.has_media:
+                stages.append(partial(self._shade_media, scene, chunk, 0, radiance))
+            else:
+                stages.append(partial(self._shade, scene, chunk, 0, radiance, last=True))
         return [partial(self._launch_idle, stage, size) for stage in stages for size in BUILD_SIZES]
 
     def _launch_idle(self, stage: Callable[[], object], size: int) -> None:
