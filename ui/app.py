@@ -31,11 +31,19 @@ class App:
 
     def __init__(self, document: Document, device: str | None = None, opened: Path | None = None) -> None:
         kept, complaints = preferences.load()
-        self.window = Window(kept.window_size, "incpt", preferences.layout_path(), kept.ui_scale)
-        implot.create_context()
-        self.display = Display(self.window.context)
+        self._has_window = False
+        # The device is opened in the renderer's thread while the window opens in this one.
         self.editor = Editor(document, self._open_renderer, kept, device)
         self.editor.start_over(document, opened)
+        self.editor.renderer.show(self.editor.view)
+        try:
+            self.window = Window(kept.window_size, "incpt", preferences.layout_path(), kept.ui_scale)
+        except BaseException:
+            self.editor.renderer.close()
+            raise
+        self._has_window = True
+        implot.create_context()
+        self.display = Display(self.window.context)
         self.workspace = Workspace()
         self.viewport = Viewport()
         self.recovery = recovery.Recovery(kept.autosave_seconds)
@@ -44,7 +52,6 @@ class App:
         self._rect: Rect = (0.0, 0.0, 1.0, 1.0)
         self._shown_frame: object = None
         self._kept = kept
-        self.editor.renderer.show(self.editor.view)
         self._offer_recovery()
 
     def run(self) -> None:
@@ -107,7 +114,11 @@ class App:
         return flat.reshape(height, width, 3)[::-1]
 
     def _open_renderer(self, device: str | None) -> ThreadedRenderer:
-        return ThreadedRenderer(device, self.window.wake)
+        return ThreadedRenderer(device, self._wake)
+
+    def _wake(self) -> None:
+        if self._has_window:
+            Window.wake()
 
     def _draw_below(self) -> None:
         pixels = imgui.get_io().display_framebuffer_scale.x
