@@ -19,7 +19,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from statistics import median
 
@@ -51,9 +51,11 @@ SETTLED_SPP = 64
 MOST_AHEAD = 2
 """Steps that the answer to an edit may cost the other side of a split view in advance."""
 AOV_SHARE = 0.2
-"""Of the time of a step, for first-hit images while the scene changes."""
+"""Of the time of a step, for first-hit images."""
 MOST_BELIEVED = 4.0
 """How many times slower or faster a tile may become from one step to the next."""
+FIRST_SHARE = 0.5
+"""Of the time of a step, for those up to the first tile after an edit."""
 COARSEST = 16
 """The largest divisor of the resolution while everything starts over."""
 
@@ -348,8 +350,10 @@ class _Side:
         )
 
     def step(self, step_ms: float) -> StepReport:
-        """One step of about that length."""
+        """One step of about that length; a shorter one where an edit waits for its first tile."""
         session = self.session
+        if not self.answered and session.mode is Mode.INCREMENTAL:
+            step_ms *= FIRST_SHARE
         slots, queue, first = self._slots(step_ms / 1e3), session.queue, session.cursor.tiles
         start = self._clock()
         report = session.step(slots)
@@ -399,11 +403,11 @@ class _Side:
 
     # ------------------------------------------------------------------------------------ pictures
 
-    def image(self, resting: bool) -> Float32Image:
+    def image(self, must_be_new: bool) -> Float32Image:
         """(h, w, 4) the picture, read anew where that is worth it."""
         if self._image is None or (
             self._is_stale
-            and (resting or self._must_read or self._clock() - self._read_at >= self._image_seconds())
+            and (must_be_new or self._must_read or self._clock() - self._read_at >= self._image_seconds())
         ):
             self._image = self.session.image(alpha=True)
             self._read_at, self._must_read, self._is_stale = self._clock(), False, False
@@ -468,6 +472,8 @@ class Live:
         self._is_pinning = False
         self._aovs: Aovs | None = None
         self._aovs_of: tuple[object, ...] | None = None
+        self._aovs_wanted: tuple[object, ...] | None = None
+        self._bands: list[Aovs] = []
         self._aov_pace = _Pace(5e6 if self.device.is_cpu else 5e8)
         self._rest_is_shown = False
         self._step_seconds, self._speed = 0.0, 0.0
@@ -492,10 +498,9 @@ class Live:
                 self._step(side)
             elif self._rest_is_shown:
                 return None
-            if self._view.aovs and (self._main.answered or side is None):
-                self._update_aovs()
-            self._rest_is_shown = side is None
-            return self._frame(resting=side is None)
+            has_aovs = not self._view.aovs or ((self._main.answered or side is None) and self._update_aovs())
+            self._rest_is_shown = side is None and has_aovs
+            return self._frame(resting=self._rest_is_shown)
         except (DeviceError, MemoryError) as error:
             raise RenderingStoppedError(_explain(error)) from error
 
@@ -603,27 +608,39 @@ class Live:
             speed = report.paths / report.seconds
             self._speed = speed if self._speed == 0 else 0.8 * self._speed + 0.2 * speed
 
-    def _update_aovs(self) -> None:
-        """First hits of the scene that is shown; fewer than pixels while it changes, to cost little."""
+    def _update_aovs(self) -> bool:
+        """Some rows of the first hits of the scene that is shown; returns whether they are all there. While
+        it changes there are fewer of them than pixels, so that they come at once and cost little."""
         main = self._main
         scene, (width, height) = main.view.scene, main.view.size
+        rays = self._aov_pace.speed * self._view.step_ms / 1e3 * AOV_SHARE
         divisor = 1
-        if not main.rests and not self._view.paused:
-            rays = self._aov_pace.speed * self._view.step_ms / 1e3 * AOV_SHARE
-            while divisor < COARSEST and width * height / divisor**2 > rays:
-                divisor *= 2
-        size = -(-width // divisor), -(-height // divisor)
-        wanted = (scene.camera, scene.objects, scene.materials, size)
+        is_moving = not main.rests and not self._view.paused
+        while is_moving and divisor < COARSEST and width * height / divisor**2 > rays:
+            divisor *= 2
+        width, height = -(-width // divisor), -(-height // divisor)
+        wanted = (scene.camera, scene.objects, scene.materials, width, height)
         if wanted == self._aovs_of:
-            return
+            return True
+        if wanted != self._aovs_wanted:
+            self._aovs_wanted, self._bands = wanted, []
+        top = sum(len(band.depth) for band in self._bands)
+        bottom = height if is_moving else min(top + max(1, int(rays / width)), height)
         start = self._clock()
-        self._aovs, self._aovs_of = self.session.aovs(size), wanted
-        self._aov_pace.add(size[0] * size[1], self._clock() - start)
+        self._bands.append(self.session.aovs((width, height), (top, bottom)))
+        self._aov_pace.add(width * (bottom - top), self._clock() - start)
+        if bottom < height:
+            return False
+        self._aovs, self._aovs_of, self._bands = _joined(self._bands), wanted, []
+        self._aovs_wanted = None
+        return True
 
     def _frame(self, resting: bool) -> Frame:
         main, view = self._main, self._view
-        if self._is_pinning and main.divisor == 1 and main.image(resting)[..., 3].min() > 0:
-            self._reference, self._is_pinning = main.image(resting)[..., :3], False
+        if self._is_pinning and main.divisor == 1:
+            image = main.image(must_be_new=True)
+            if image[..., 3].min() > 0:
+                self._reference, self._is_pinning = image[..., :3], False
         pictures = tuple(side.picture(self._reference, resting) for side in self._sides)
         if not main.shows(view):
             shown = main.view
@@ -641,6 +658,11 @@ class Live:
             nonfinite=sum(side.nonfinite for side in self._sides),
             resting=resting,
         )
+
+
+def _joined(bands: list[Aovs]) -> Aovs:
+    """First hits of rows that follow each other."""
+    return Aovs(*(np.concatenate([getattr(band, f.name) for band in bands]) for f in fields(Aovs)))
 
 
 def _explain(error: Exception) -> str:

@@ -252,10 +252,18 @@ class Session:
         """(H, W) samples behind each pixel; 0 where the old picture waits to be thrown away."""
         return tile_image(self._grid, self._tile_spp)
 
-    def aovs(self, size: tuple[int, int] | None = None) -> Aovs:
-        """Auxiliary images of the scene as it is now, of the session's size or another; see Aovs."""
-        width, height = self.size if size is None else size
-        params = self._params((width, height))
+    def aovs(self, size: tuple[int, int] | None = None, rows: tuple[int, int] | None = None) -> Aovs:
+        """Auxiliary images of the scene as it is now, of the session's size or another; see Aovs. `rows`:
+        from the first of them up to the second only."""
+        width, whole_height = self.size if size is None else size
+        params = self._params((width, whole_height))
+        top, bottom = (0, whole_height) if rows is None else rows
+        height = bottom - top
+        # The rows are an image of their own, of a camera that looks a little up or down.
+        camera = params["camera"]
+        camera["forward"] += (1 - (top + bottom) / whole_height) * camera["up"]
+        camera["up"] *= height / whole_height
+        params["height"] = height
         # Tiles of any size serve; these keep neighbouring rays together.
         params["tile_size"] = RenderSettings.tile_size
         grid = tiles.TileGrid(width, height, RenderSettings.tile_size)

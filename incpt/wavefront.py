@@ -80,10 +80,9 @@ class Wavefront:
     ) -> None:
         whole = params.copy()
         whole["path_count"] = path_count
-        blocks = max(-(-path_count // layout.BLOCK_PATHS), self._least_size)
-        kernel = self.device.kernel(
-            "trace_blocks", features=(*scene.features, *(("MEDIA",) if scene.has_media else ()))
-        )
+        # One at least, to build the kernel. A block past the last path would take its count for a huge one.
+        blocks = max(-(-path_count // layout.BLOCK_PATHS), 1)
+        kernel = self.device.kernel("trace_blocks", features=scene.variant)
         planes = (layout.RayPlane, layout.PathPlane, layout.HitPlane, layout.ShadowPlane)
         local = [cl.LocalMemory(4 * n * layout.BLOCK_PATHS) for n in (*map(len, planes), 3, 1, 1)]
         self.device.launch(
@@ -121,9 +120,7 @@ class Wavefront:
             partial(self._intersect, scene, chunk, 0),
             partial(self._describe, scene, chunk, np.uint32(0), nothing, nothing),
         ]
-        if self.in_blocks:
-            stages.append(partial(self._trace_blocks, scene, params, slots, 0, radiance))
-        else:
+        if not self.in_blocks:
             stages += [
                 partial(self._illuminate, scene, chunk, 0, self._surfaces),
                 partial(self._shade, scene, chunk, 0, radiance),
@@ -134,7 +131,12 @@ class Wavefront:
                 stages.append(partial(self._shade_media, scene, chunk, 0, radiance))
             else:
                 stages.append(partial(self._shade, scene, chunk, 0, radiance, last=True))
-        return [partial(self._launch_idle, stage, size) for stage in stages for size in BUILD_SIZES]
+        launches: list[Callable[[], None]] = [
+            partial(self._launch_idle, stage, size) for stage in stages for size in BUILD_SIZES
+        ]
+        if self.in_blocks:  # a work-item is a block of paths, so that grids are small always
+            launches.append(partial(self._trace_blocks, scene, params, slots, 0, radiance))
+        return launches
 
     def _launch_idle(self, stage: Callable[[], object], size: int) -> None:
         self._least_size = size

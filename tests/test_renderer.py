@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from weakref import WeakKeyDictionary
 
 import pytest
 from small_scenes import mixed_scene
@@ -41,17 +42,22 @@ def renderer(device: Device) -> Iterator[ThreadedRenderer]:
     assert not renderer.is_alive
 
 
+_unread: WeakKeyDictionary[Renderer, list[Message]] = WeakKeyDictionary()
+
+
 def wait_for(renderer: Renderer, kind: type, condition: Callable[..., bool] = lambda _: True) -> Message:
-    """The first message of that kind that meets the condition."""
+    """The next message of that kind that meets the condition."""
     deadline = time.monotonic() + PATIENCE
+    unread = _unread.setdefault(renderer, [])
     seen: list[Message] = []
     while time.monotonic() < deadline:
-        for message in renderer.poll():
-            if isinstance(message, kind) and condition(message):
-                return message
-            seen.append(message)
+        unread += renderer.poll()
+        while unread:
+            seen.append(unread.pop(0))
+            if isinstance(seen[-1], kind) and condition(seen[-1]):
+                return seen[-1]
         time.sleep(0.002)
-    raise AssertionError(f"no {kind.__name__} among {seen}")
+    raise AssertionError(f"no {kind.__name__} among {[type(message).__name__ for message in seen]}")
 
 
 def moved(scene: Scene) -> Scene:
@@ -90,11 +96,14 @@ def test_answers_requests(renderer: ThreadedRenderer, tmp_path: Path) -> None:
     renderer.request(Export(tmp_path / "a.exr", aovs=True))
     assert wait_for(renderer, Exported) == Exported(tmp_path / "a.exr")
     assert (tmp_path / "a.exr").stat().st_size > 1000
+    renderer.show(View(mixed_scene(), target_spp=3))
+    wait_for(renderer, Frame, lambda frame: frame.resting and frame.view.target_spp == 3)
     renderer.request(Pin(True))
-    wait_for(renderer, Frame, lambda frame: frame.resting)
+    frame = wait_for(renderer, Frame, lambda frame: frame.resting and frame.pictures[0].error == 0)
     renderer.request(Restart())
-    frame = wait_for(renderer, Frame, lambda frame: frame.resting and frame.pictures[0].error is not None)
-    assert isinstance(frame, Frame) and frame.pictures[0].error < 0.01
+    again = wait_for(renderer, Frame, lambda frame: frame.resting)
+    assert isinstance(frame, Frame) and isinstance(again, Frame)
+    assert again.pictures[0].image is not frame.pictures[0].image and again.pictures[0].error < 1e-3
 
 
 def test_problem_of_a_request_or_an_edit_ends_nothing(

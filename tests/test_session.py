@@ -276,16 +276,20 @@ def test_alpha_tells_where_there_was_a_picture(device: Device) -> None:
     np.testing.assert_array_equal(session.image(alpha=True), image)
 
 
-def test_no_kernel_is_built_after_building(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("in_blocks", [False, True])
+def test_no_kernel_is_built_after_building(
+    device: Device, monkeypatch: pytest.MonkeyPatch, in_blocks: bool
+) -> None:
     bright = mixed_scene().with_environment(image=None)
     opaque = mixed_scene().without_object("glass ball").with_material("glass", transmission=0.0)
     for scene in (mixed_scene(), bright, bright.without_object("lamp"), opaque):
         monkeypatch.setattr(device, "_kernels", {})
         monkeypatch.setattr(device, "built", set())
         session = Session(scene, device=device)
+        session._wavefront.in_blocks &= in_blocks
         seen: list[tuple[int, int]] = []
         session.build(lambda *progress: seen.append(progress))  # noqa: B023
-        assert seen == [(i + 1, len(seen)) for i in range(len(seen))] and len(seen) >= 16
+        assert seen == [(i + 1, len(seen)) for i in range(len(seen))] and len(seen) > 6
         with monkeypatch.context() as patch:
             patch.setattr(device, "_build", None)
             session.render(3)
@@ -470,6 +474,16 @@ def test_aovs_may_have_another_size(device: Device) -> None:
     np.testing.assert_array_equal(
         small.object_id, Session(mixed_scene(size=(11, 7)), device=device).aovs().object_id
     )
+
+
+def test_aovs_come_by_rows_too(device: Device) -> None:
+    session = Session(mixed_scene(), device=device)
+    whole = session.aovs()
+    for rows in ((0, 3), (3, 20), (20, 28)):
+        part = session.aovs(rows=rows)
+        np.testing.assert_array_equal(part.object_id, whole.object_id[slice(*rows)])
+        np.testing.assert_allclose(part.depth, whole.depth[slice(*rows)], rtol=1e-4)
+        np.testing.assert_allclose(part.normal, whole.normal[slice(*rows)], atol=1e-3)
 
 
 def test_aovs_describe_first_hits(device: Device) -> None:
