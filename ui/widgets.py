@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TypeVar
 
+import numpy as np
 from imgui_bundle import imgui
 
 from incpt.errors import InputError, one_line
@@ -117,9 +118,12 @@ def color(label: str, value: Vector, *, is_radiance: bool = False, tip: str = ""
     if is_radiance:
         flags |= imgui.ColorEditFlags_.hdr
     with row(label, tip) as field:
-        changed, result = imgui.color_edit3(field, list(value), flags)
+        shown = list(map(_rounded, value))
+        _, result = imgui.color_edit3(field, shown, flags)
         places.note(label)
-    return (result[0], result[1], result[2]) if changed else value
+    # What was not touched stays to the bit, which imgui's 32 bits would round.
+    r, g, b = (old if new == seen else new for old, seen, new in zip(value, shown, result, strict=True))
+    return r, g, b
 
 
 def radiance(label: str, value: Vector, tip: str = "") -> Vector:
@@ -235,6 +239,10 @@ def _clipped_text(label: str, width: float) -> None:
     imgui.text_unformatted(shown)
     if shown != label:
         imgui.set_item_tooltip(label)
+
+
+def _rounded(value: float) -> float:
+    return float(np.float32(value))
 
 
 def _escaped(unit: str) -> str:
