@@ -113,12 +113,20 @@ def _move(device: Device, count: int, work: Work) -> dict[str, Any]:
     return {"ms": 1e3 * (time.perf_counter() - began), "count": count}
 
 
-_WHAT = {
+WHAT = {
     BUILD: "building the tree of a mesh, by triangles",
     REFIT: "refitting it to other vertices, by triangles",
     TOP: "building the top level, by objects",
     MOVE: "moving one object, everything included, by objects",
 }
+
+
+def points(results: Results, measure: str, what: str | None = None) -> list[tuple[float, float]]:
+    """(count, median milliseconds) by count; none where `what` is not what the measure is counted in."""
+    chosen = [r for r in results.where(measure=measure) if what is None or what in r.subject]
+    times = grouped(Results(records=tuple(chosen)), lambda r: r.values["ms"], "triangles", "objects")
+    counts = {(r.subject.get("triangles"), r.subject.get("objects")): r.values["count"] for r in chosen}
+    return sorted((float(counts[key]), summary(values).median) for key, values in times.items())
 
 
 def table(results: Results) -> Table:
@@ -127,22 +135,20 @@ def table(results: Results) -> Table:
     shown.add_column("")
     for column in ("count", "ms", "per million, s", "bytes each", "grows as"):
         shown.add_column(column, justify="right")
-    for measure, what in _WHAT.items():
-        chosen = Results(results.environments, tuple(results.where(measure=measure)))
+    for measure, what in WHAT.items():
+        law = fitted(*zip(*points(results, measure), strict=True)) if results.where(measure=measure) else None
+        chosen = Results(records=tuple(results.where(measure=measure)))
         times = grouped(chosen, lambda r: r.values["ms"], "triangles", "objects")
-        counts = {(r.subject.get("triangles"), r.subject.get("objects")): r.values for r in chosen.records}
-        points = [(counts[key]["count"], summary(values).median) for key, values in times.items()]
-        growth = fitted([c for c, _ in points], [ms for _, ms in points])
-        for i, (key, values) in enumerate(sorted(times.items(), key=lambda item: counts[item[0]]["count"])):
-            count = counts[key]["count"]
-            nbytes = counts[key].get("bytes_per_triangle")
+        for i, key in enumerate(sorted(times, key=lambda k: k[0] or k[1])):
+            values = chosen.where(triangles=key[0], objects=key[1])[0].values
+            each = values.get("bytes_per_triangle")
             shown.add_row(
                 what if i == 0 else "",
-                f"{count:,}",
-                summary(values).text(),
-                significant(summary(values).median * 1e3 / count),
-                "" if nbytes is None else significant(nbytes),
-                "" if growth is None or i else growth.text(),
+                f"{values['count']:,}",
+                summary(times[key]).text(),
+                significant(summary(times[key]).median * 1e3 / values["count"]),
+                "" if each is None else significant(each),
+                law.text() if law and i == 0 else "",
             )
     return shown
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import typer
 
-from incpt.benchmarks import build, rays, scale, sweep, table51
+from incpt.benchmarks import build, rays, report, scale, sweep, table51
 from incpt.benchmarks.experiment import Stopped
 from incpt.benchmarks.peers import compare
 
@@ -29,6 +29,7 @@ app.command("rays")(rays.rays)
 app.command("peers")(compare.peers)
 app.command("build")(build.build)
 app.command("scale")(scale.scale)
+app.command("report")(report.report)
 
 
 @app.callback()

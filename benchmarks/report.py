@@ -1,0 +1,199 @@
+"""`incpt bench report`: one page with plots and pictures from whatever results are there.
+
+The page holds everything in itself: plots as SVG, pictures as PNG in the text.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Iterable
+from html import escape
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from incpt import files
+from incpt.benchmarks import build, options, plots, rays, scale, store, sweep, table51, tables
+from incpt.benchmarks.fit import fitted
+from incpt.benchmarks.peers import compare
+from incpt.benchmarks.store import Results, grouped
+from incpt.benchmarks.timing import Summary, summary
+from incpt.errors import InputError
+
+_STYLE = """
+body { font: 15px/1.5 system-ui, sans-serif; max-width: 1100px; margin: 2em auto; padding: 0 1em }
+h1, h2 { line-height: 1.2 } h2 { margin-top: 2.5em; border-bottom: 1px solid #ccc }
+table { border-collapse: collapse; margin: 1em 0; font-size: 13px }
+th, td { padding: .25em .7em; border-bottom: 1px solid #ddd; text-align: right } th:first-child,
+td:first-child { text-align: left } figure { display: inline-block; margin: .5em 1em .5em 0 }
+svg, img { max-width: 100%; height: auto } .busy { background: #fff3cd; padding: .5em 1em }
+code { font-size: 12px; overflow-wrap: anywhere } .small { color: #555; font-size: 13px }
+"""
+
+
+def page(folder: Path) -> str:
+    """The whole page. Raises InputError where there are no results."""
+    found = {name: store.read(folder / f"{name}.jsonl").latest() for name in SECTIONS}
+    there = {name: results for name, results in found.items() if results.records}
+    if not there:
+        raise InputError(f"{folder}: no results; measure first, for example with incpt bench sweep")
+    parts = ["<h1>incpt: benchmarks</h1>"]
+    for name, results in there.items():
+        title, section = SECTIONS[name]
+        parts.append(f'<h2 id="{name}">{escape(title)}</h2>')
+        parts += _context(results)
+        parts += section(results, folder)
+    body = "\n".join(parts)
+    head = f'<meta charset="utf-8"><title>incpt: benchmarks</title><style>{_STYLE}</style>'
+    return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head>\n<body>\n{body}\n</body></html>\n'
+
+
+def _context(results: Results) -> Iterable[str]:
+    """On what it was measured, by which commands, and whether the machine was busy."""
+    for line in tables.notes(results):
+        kind = "busy" if line.startswith("BUSY") else "small"
+        yield f'<p class="{kind}">{escape(line)}</p>'
+    for command in dict.fromkeys(record.command for record in results.records if record.command):
+        yield f"<p><code>{escape(command)}</code></p>"
+
+
+def html_table(table: Table) -> str:
+    """A table of the terminal as one of a page."""
+    title = f"<p><b>{escape(str(table.title))}</b></p>" if table.title else ""
+    head = "".join(f"<th>{escape(str(column.header))}</th>" for column in table.columns)
+    columns = [list(column.cells) for column in table.columns]
+    rows = [
+        "<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>"
+        for row in zip(*columns, strict=True)
+    ]
+    return f"{title}<table><tr>{head}</tr>{''.join(rows)}</table>"
+
+
+def _figure(drawn: str) -> str:
+    return f"<figure>{drawn}</figure>"
+
+
+# ------------------------------------------------------------------------------------------ sections
+
+
+def _sweep(results: Results, folder: Path) -> Iterable[str]:
+    names = ("scene", "edit", "tile_size", "max_bounces")
+    for key in dict.fromkeys(tuple(r.subject[name] for name in names) for r in results.records):
+        chosen = results.where(**dict(zip(names, key, strict=True)))
+        yield from (
+            _figure(drawn) for drawn in _sweep_plots(Results(results.environments, tuple(chosen)), key)
+        )
+    yield html_table(sweep.table(results))
+
+
+def _sweep_plots(results: Results, key: tuple[Any, ...]) -> Iterable[str]:
+    _, edit, tile, bounces = key
+    title = f"{edit} (tile {tile}, {bounces} bounces)"
+    for unit, x_label in (("steps", "steps after the edit"), ("s", "seconds after the edit")):
+        curves: dict[str, list[tuple[float, float]]] = {}
+        for record in results.records:
+            if record.subject["repetition"] != 0:
+                continue
+            nor = record.subject["nor"]
+            name = record.subject["strategy"] + ("" if nor is None else f" {nor}")
+            points = [
+                (float(row["mark"].split()[0]), float(row["normalized_rmse"]))
+                for row in record.rows
+                if row["mark"].endswith(f" {unit}")
+            ]
+            if points:
+                curves[name] = sorted(points)
+        if curves:
+            yield plots.lines(curves, x_label, "normalized RMSE", title)
+
+
+def _table51(results: Results, folder: Path) -> Iterable[str]:
+    yield from (html_table(table) for table in table51.tables(results))
+    curves = {}
+    for variant in table51.VARIANTS:
+        record = table51.record_of(results, table51.TABLE_EDIT, variant)
+        if record is not None:
+            points = [(float(row["steps"]), float(row["normalized_rmse"])) for row in record.rows]
+            curves[variant.label] = sorted(points)
+    for i, label in enumerate(("standard", "NoR 64", "NoR 128", "NoR 256")):
+        curves[f"thesis: {label}"] = [(float(n), row[i]) for n, row in table51.THESIS.items()]
+    yield _figure(plots.lines(curves, "steps after the edit", "normalized RMSE", table51.TABLE_EDIT))
+    for picture in sorted(folder.glob("figures-*.png")):
+        encoded = base64.b64encode(picture.read_bytes()).decode()
+        yield f'<figure><img alt="{escape(picture.stem)}" src="data:image/png;base64,{encoded}"></figure>'
+
+
+def _rays(results: Results, folder: Path) -> Iterable[str]:
+    rates = grouped(results, lambda r: r.values.get("rays_per_second"), "scene", "rays", "tracer")
+    for scene in dict.fromkeys(scene for scene, _, _ in rates):
+        groups: dict[str, dict[str, Summary]] = {}
+        for (place, kind, tracer), values in rates.items():
+            if place == scene:
+                groups.setdefault(str(kind), {})[str(tracer)] = summary([v / 1e6 for v in values])
+        yield _figure(plots.bars(groups, "million rays per second", str(scene)))
+    yield html_table(rays.table(results))
+
+
+def _peers(results: Results, folder: Path) -> Iterable[str]:
+    drawn = (
+        (compare.RATE, "paths_per_second", 1e-6, "million camera paths per second", False),
+        (compare.RATE, "error_seconds", 1.0, "relMSE x seconds", True),
+        (compare.MOVE, "ms", 1.0, "edit to first picture, ms", True),
+    )
+    for measure, value, factor, label, logarithmic in drawn:
+        groups: dict[str, dict[str, Summary]] = {}
+        for (peer, scene), values in compare.medians(results, measure, value).items():
+            groups.setdefault(scene, {})[peer] = summary([factor * v for v in values])
+        if groups:
+            yield _figure(plots.bars(groups, label, label, logarithmic))
+    yield from (html_table(table) for table in compare.tables(results))
+
+
+def _build(results: Results, folder: Path) -> Iterable[str]:
+    for what in ("triangles", "objects"):
+        curves = {name: points for name in build.WHAT if (points := build.points(results, name, what))}
+        laws = {
+            name: law
+            for name, points in curves.items()
+            if (law := fitted([x for x, _ in points], [y for _, y in points]))
+        }
+        if curves:
+            yield _figure(plots.lines(curves, what, "ms", f"trees against {what}", laws))
+    yield html_table(build.table(results))
+
+
+def _scale(results: Results, folder: Path) -> Iterable[str]:
+    for axis in scale.AXES:
+        points, law = scale.growth(results, axis.name)
+        if points:
+            laws = {} if law is None else {axis.name: law}
+            label = "milliseconds of a step"
+            yield _figure(plots.lines({axis.name: points}, axis.what, label, axis.name, laws))
+    yield html_table(scale.table(results))
+
+
+Section = Callable[[Results, Path], Iterable[str]]
+
+SECTIONS: dict[str, tuple[str, Section]] = {
+    table51.NAME: ("The thesis's table 5.1 and figures 5.1 to 5.6", _table51),
+    sweep.NAME: ("Tile size, NoR, strategy, bounces", _sweep),
+    compare.NAME: ("Beside other renderers", _peers),
+    rays.NAME: ("Traversal beside Embree", _rays),
+    build.NAME: ("Trees: build, refit, top level", _build),
+    scale.NAME: ("How cost grows", _scale),
+}
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(help="Folder with results.")] = options.DEFAULT_FOLDER,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="The page [default: report.html there].")
+    ] = None,
+) -> None:
+    """One self-contained HTML page with plots and pictures from whatever results are there."""
+    options.optional("matplotlib", "bench report", "bench")
+    target = folder / "report.html" if output is None else output
+    files.write_bytes(target, page(folder).encode())
+    print(target)
