@@ -117,9 +117,13 @@ class Editor:
         return True
 
     def undo(self) -> None:
+        """Take back the last edit; a drag under way is given up."""
+        self._has_cancelled |= self.document.history.before is not None
         self._restore_selection(self.document.history.undo())
 
     def redo(self) -> None:
+        """Do again what was taken back; a drag under way is ended."""
+        self._has_cancelled |= self.document.history.before is not None
         self._restore_selection(self.document.history.redo())
 
     def cancel(self) -> None:
@@ -179,7 +183,7 @@ class Editor:
             self.preferences = replace(self.preferences, navigation=navigation)
 
     def steer(self, control: Control) -> None:
-        """Pause, aim and resolution of rendering."""
+        """Pause, aim and resolution of rendering. Raises InputError."""
         self.paused, self.target_spp = control.paused, control.target_spp
         changed = replace(
             self.preferences,

@@ -22,6 +22,7 @@ T = TypeVar("T")
 _AXES = ("X", "Y", "Z")
 _AXIS_COLORS = ((0.90, 0.35, 0.38, 1.0), (0.52, 0.78, 0.30, 1.0), (0.35, 0.58, 0.95, 1.0))
 _LABEL_SHARE = 0.38
+_edited = [0]
 
 
 class Refusals:
@@ -70,7 +71,7 @@ def number(
     with row(label, tip) as field:
         form = f"%.{decimals}f{_escaped(unit)}"
         changed, result = imgui.drag_float(field, value, speed, low, high, form, flags)
-        places.note(label)
+        _note(label, changed)
     return result if changed else value
 
 
@@ -81,7 +82,7 @@ def whole_number(label: str, value: int, *, low: int, high: int, speed: float = 
         shown = min(max(value, -(1 << 31)), (1 << 31) - 1)
         flags = imgui.SliderFlags_.always_clamp
         changed, result = imgui.drag_int(field, shown, speed, low, high, "%d", flags)
-        places.note(label)
+        _note(label, changed)
     return result if changed else value
 
 
@@ -105,7 +106,7 @@ def vector(
             _axis_mark(axis, name)
             form = f"%.{decimals}f{_escaped(unit)}"
             changed, typed = imgui.drag_float(f"##{axis}", value[axis], speed, low, high, form)
-            places.note(f"{label} {name}")
+            _note(f"{label} {name}", changed)
         if changed:
             result[axis] = typed
     imgui.pop_id()
@@ -119,8 +120,8 @@ def color(label: str, value: Vector, *, is_radiance: bool = False, tip: str = ""
         flags |= imgui.ColorEditFlags_.hdr
     with row(label, tip) as field:
         shown = list(map(_rounded, value))
-        _, result = imgui.color_edit3(field, shown, flags)
-        places.note(label)
+        changed, result = imgui.color_edit3(field, shown, flags)
+        _note(label, changed)
     # What was not touched stays to the bit, which imgui's 32 bits would round.
     r, g, b = (old if new == seen else new for old, seen, new in zip(value, shown, result, strict=True))
     return r, g, b
@@ -144,8 +145,8 @@ def radiance(label: str, value: Vector, tip: str = "") -> Vector:
 def checkbox(label: str, value: bool, tip: str = "") -> bool:
     """On or off."""
     with row(label, tip) as field:
-        _, result = imgui.checkbox(field, value)
-        places.note(label)
+        changed, result = imgui.checkbox(field, value)
+        _note(label, changed)
     return result
 
 
@@ -157,9 +158,10 @@ def choice(label: str, value: str, options: Sequence[tuple[str, str]], tip: str 
         places.note(label)
         if is_open:
             for option, text in options:
-                if imgui.selectable(text, option == value)[0]:
+                chosen = imgui.selectable(text, option == value)[0]
+                _note(f"{label}: {text}", chosen)
+                if chosen:
                     value = option
-                places.note(f"{label}: {text}")
             imgui.end_combo()
     return value
 
@@ -218,6 +220,17 @@ def show_refusals(refusals: Refusals) -> None:
     """What was refused in this frame."""
     for message in refusals.messages:
         note(message, theme.WARNING)
+
+
+def edited() -> int:
+    """imgui's number of the widget whose value changed last: what the edits of one drag have in common."""
+    return _edited[0]
+
+
+def _note(name: str, has_changed: bool) -> None:
+    places.note(name)
+    if has_changed:
+        _edited[0] = imgui.get_item_id()
 
 
 def _axis_mark(axis: int, name: str) -> None:

@@ -18,7 +18,6 @@ from incpt.ui.panels.plots import Records
 from incpt.ui.widgets import Refusals
 
 _RIGHT_SHARE, _OUTLINER_SHARE = 0.25, 0.28
-_WIDGET = "widget "
 
 
 class Workspace:
@@ -96,17 +95,17 @@ class Workspace:
             return
         if count > 1:
             widgets.note(f"{count} objects are selected; the fields show this one.")
+        refusals = Refusals()
         with widgets.section("Gizmo", is_open=False) as is_open:
             if is_open:
-                editor.tool, snap = tool.draw(editor.tool, editor.preferences.snap)
+                editor.tool, snap = tool.draw(editor.tool, editor.preferences.snap, refusals)
                 editor.change_snap(snap)
-        refusals = Refusals()
         obj = editor.scene.object(name)
         with widgets.section("Transform") as is_open:
             if is_open:
                 new, self._is_uniform = transform.draw(obj, self._is_uniform, refusals)
                 if new is not obj:
-                    editor.propose(_with_object(editor.scene, name, new), "Transform", _key(editor))
+                    editor.propose(_with_object(editor.scene, name, new), "Transform", _key())
         self._draw_material(editor, name, refusals)
         _tell(editor, refusals)
 
@@ -121,7 +120,7 @@ class Workspace:
             new = material_panel.draw(scene.materials[material], refusals)
         if new is not scene.materials[material]:
             materials = {**scene.materials, material: new}
-            editor.propose(replace(scene, materials=materials), f"Material {material}", _key(editor))
+            editor.propose(replace(scene, materials=materials), f"Material {material}", _key())
         editor.attempt(lambda: _apply_material_outcome(editor, material, outcome))
 
     def _draw_scene(self, editor: Editor) -> None:
@@ -131,7 +130,7 @@ class Workspace:
             if is_open:
                 camera = scene_panel.draw_camera(scene.camera, refusals)
                 if camera is not scene.camera:
-                    editor.propose(replace(scene, camera=camera), "Camera", _key(editor))
+                    editor.propose(replace(scene, camera=camera), "Camera", _key())
                 if widgets.button("Frame selected##camera"):
                     actions.frame_selected(editor)
                 widgets.same_line()
@@ -142,7 +141,7 @@ class Workspace:
             if is_open:
                 environment, asked = scene_panel.draw_environment(scene.environment, refusals)
                 if environment is not scene.environment:
-                    editor.propose(replace(scene, environment=environment), "Environment", _key(editor))
+                    editor.propose(replace(scene, environment=environment), "Environment", _key())
                 if asked.is_choose:
                     actions.choose_environment(editor)
                 if asked.is_remove:
@@ -159,15 +158,15 @@ class Workspace:
             preferences.drag_nor,
         )  # fmt: skip
         new, is_restart = render.draw_control(control)
-        editor.steer(new)
+        refusals = Refusals()
+        refusals.accepted(None, lambda: editor.steer(new))
         if is_restart:
             editor.restart()
-        refusals = Refusals()
         with widgets.section("Settings of the scene") as is_open:
             if is_open:
                 settings = render.draw_settings(editor.scene.settings, refusals)
                 if settings is not editor.scene.settings:
-                    editor.propose(replace(editor.scene, settings=settings), "Render settings", _key(editor))
+                    editor.propose(replace(editor.scene, settings=settings), "Render settings", _key())
         _tell(editor, refusals)
 
     def _draw_device(self, editor: Editor) -> None:
@@ -179,10 +178,12 @@ class Workspace:
             editor.change_device(chosen)
 
     def _draw_method(self, editor: Editor) -> None:
+        refusals = Refusals()
         with widgets.section("Display") as is_open:
             if is_open:
-                display = display_panel.draw(editor.preferences.display, list(OVERLAY_NAMES.items()))
-                editor.change_display(display)
+                overlays = list(OVERLAY_NAMES.items())
+                editor.change_display(display_panel.draw(editor.preferences.display, overlays, refusals))
+        _tell(editor, refusals)
         with widgets.section("Measurements") as is_open:
             if is_open:
                 if editor.frame is not None:
@@ -209,13 +210,10 @@ def _lay_out(root: int) -> None:
     builder.dock_builder_finish(root)
 
 
-def _key(editor: Editor) -> str:
-    """What the edits of one drag or one typing have in common: the widget that is active. Escape takes the
-    activity away before the widget gives its old value back, which belongs to the same entry."""
-    active, under_way = imgui.internal.get_active_id(), editor.document.history.key
-    if active == 0 and under_way is not None and under_way.startswith(_WIDGET):
-        return under_way
-    return f"{_WIDGET}{active}"
+def _key() -> str:
+    """What the edits of one drag or one typing have in common: the widget that changed its value. Not the
+    active one: that is the next field already when Tab ends the typing, and none when Escape ends a drag."""
+    return f"widget {widgets.edited()}"
 
 
 def _tell(editor: Editor, refusals: Refusals) -> None:

@@ -7,11 +7,14 @@ from dataclasses import replace
 
 from incpt.ui import widgets
 from incpt.ui.preferences import DisplaySettings
+from incpt.ui.widgets import Refusals
 
 CURVE_TEXTS = {"agx": "AgX", "filmic": "Filmic", "srgb": "sRGB, clipped"}
 
 
-def draw(display: DisplaySettings, overlays: Sequence[tuple[str, str]]) -> DisplaySettings:
+def draw(
+    display: DisplaySettings, overlays: Sequence[tuple[str, str]], refusals: Refusals
+) -> DisplaySettings:
     """Fields of the display settings; returns them after this frame."""
     exposure = widgets.number(
         "Exposure", display.exposure, low=-10.0, high=10.0, speed=0.02, unit=" EV", decimals=2
@@ -24,13 +27,16 @@ def draw(display: DisplaySettings, overlays: Sequence[tuple[str, str]]) -> Displ
     grid = widgets.checkbox("Tile grid", display.tile_grid)
     outline = widgets.checkbox("Outline", display.outline, "Around the selection")
     split = widgets.checkbox("Split view", display.split, "Left: restart, right: the chosen strategy")
-    return replace(
+    return refusals.accepted(
         display,
-        exposure=min(max(exposure, -20.0), 20.0),
-        curve=curve,
-        overlay=overlay,
-        overlay_opacity=min(max(opacity, 0.0), 1.0),
-        tile_grid=grid,
-        outline=outline,
-        split=split,
+        lambda: replace(
+            display,
+            exposure=exposure,
+            curve=curve,
+            overlay=overlay,
+            overlay_opacity=opacity,
+            tile_grid=grid,
+            outline=outline,
+            split=split,
+        ),
     )

@@ -25,7 +25,7 @@ _TILE_SIZES = (8, 16, 32, 64, 128)
 
 @dataclass(frozen=True)
 class Control:
-    """What steers rendering and is no part of the scene."""
+    """What steers rendering and is no part of the scene. Numbers may be out of range."""
 
     paused: bool
     target_spp: int | None
@@ -78,8 +78,9 @@ def draw_control(control: Control) -> tuple[Control, bool]:
         "Target spp", control.target_spp or 0, low=0, high=1 << 20, speed=1.0,
         tip="Rest when every pixel has that many samples; 0: never",
     )  # fmt: skip
-    scale = widgets.number(
-        "Resolution", control.resolution_scale * 100, low=5.0, high=400.0, speed=1.0, unit=" %", decimals=0,
+    percent = control.resolution_scale * 100
+    new_percent = widgets.number(
+        "Resolution", percent, low=5.0, high=400.0, speed=1.0, unit=" %", decimals=0,
         tip="Of the scene's own size",
     )  # fmt: skip
     step_ms = widgets.number(
@@ -90,8 +91,8 @@ def draw_control(control: Control) -> tuple[Control, bool]:
         "NoR in a drag", control.drag_nor, low=1, high=1 << 16,
         tip="Repetitions of a tile while something is dragged; the full NoR starts when it is let go",
     )  # fmt: skip
-    scale, step_ms = min(max(scale, 5.0), 400.0), min(max(step_ms, 1.0), 1000.0)
-    return Control(paused, target or None, scale / 100, step_ms, drag_nor), is_restart
+    scale = control.resolution_scale if new_percent == percent else new_percent / 100
+    return Control(paused, target or None, scale, step_ms, drag_nor), is_restart
 
 
 def draw_settings(settings: RenderSettings, refusals: Refusals) -> RenderSettings:

@@ -7,27 +7,26 @@ from dataclasses import replace
 from incpt.ui import widgets
 from incpt.ui.editor import Tool
 from incpt.ui.preferences import RANGES, SnapSettings
+from incpt.ui.widgets import Refusals
 
 OPERATIONS = (("move", "Move"), ("rotate", "Rotate"), ("scale", "Scale"))
 SPACES = (("world", "World axes"), ("local", "The object's axes"))
 
 
-def draw(tool: Tool, snap: SnapSettings) -> tuple[Tool, SnapSettings]:
+def draw(tool: Tool, snap: SnapSettings, refusals: Refusals) -> tuple[Tool, SnapSettings]:
     """Fields of the gizmo; returns both after this frame."""
     operation = widgets.choice("Gizmo", tool.operation, OPERATIONS, "What the handles in the picture do")
     space = widgets.choice("Axes", tool.space, SPACES)
     snap = replace(snap, enabled=widgets.checkbox("Snap", snap.enabled, "Move, rotate and scale in steps"))
     if snap.enabled:
-        snap = replace(
-            snap,
-            move_m=_step("Step of moves", "move_m", snap.move_m, 0.01, " m"),
-            rotate_deg=_step("Step of turns", "rotate_deg", snap.rotate_deg, 0.5, "°"),
-            scale=_step("Step of scale", "scale", snap.scale, 0.01, ""),
-        )
+        move_m = _step("Step of moves", "move_m", snap.move_m, 0.01, " m")
+        rotate_deg = _step("Step of turns", "rotate_deg", snap.rotate_deg, 0.5, "°")
+        scale = _step("Step of scale", "scale", snap.scale, 0.01, "")
+        old = snap
+        snap = refusals.accepted(old, lambda: replace(old, move_m=move_m, rotate_deg=rotate_deg, scale=scale))
     return Tool(operation, space), snap
 
 
 def _step(label: str, name: str, value: float, speed: float, unit: str) -> float:
     low, high = RANGES[name]
-    new = widgets.number(label, value, low=low, high=high, speed=speed, unit=unit)
-    return new if low <= new <= high else value
+    return widgets.number(label, value, low=low, high=high, speed=speed, unit=unit)
