@@ -10,6 +10,7 @@ import numpy.typing as npt
 from imgui_bundle import imgui, implot
 
 from incpt.errors import OutputError
+from incpt.live import Frame
 from incpt.ui import actions, preferences, recovery
 from incpt.ui.dialogs import Choice, Question
 from incpt.ui.display import Display
@@ -27,7 +28,8 @@ _WAITING_SECONDS = 0.05
 
 
 class App:
-    """The editor in its window. `frame` does one turn of the loop; the caller owns the loop."""
+    """The editor in its window. `turn` does one turn of the loop; the caller owns the loop. `shown_frame` is
+    what is on the screen."""
 
     def __init__(self, document: Document, device: str | None = None, opened: Path | None = None) -> None:
         kept, complaints = preferences.load()
@@ -50,7 +52,7 @@ class App:
         for complaint in complaints:
             self.editor.messages.add(complaint, "warning")
         self._rect: Rect = (0.0, 0.0, 1.0, 1.0)
-        self._shown_frame: object = None
+        self.shown_frame: Frame | None = None
         self._kept = kept
         self._offer_recovery()
 
@@ -82,9 +84,9 @@ class App:
             actions.quit_(editor)
         for path in window.take_dropped():
             editor.attempt(lambda path=path: actions.drop(editor, path))  # type: ignore[misc]
-        if editor.frame is not None and editor.frame is not self._shown_frame:
+        if editor.frame is not None and editor.frame is not self.shown_frame:
             self.display.upload(editor.frame.pictures, editor.frame.aovs)
-            self._shown_frame = editor.frame
+            self.shown_frame = editor.frame
         window.begin_frame()
         self._rect = self.workspace.draw(editor)
         is_held = self.viewport.update(editor, self._rect, self.display.overlay())
