@@ -8,6 +8,7 @@ often each is repeated, and whether a finished tile replaces or refines what the
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -462,11 +463,29 @@ def _slot_count(settings: RenderSettings) -> int:
 
 
 def affected_objects(old: Scene, new: Scene, change: Change) -> list[Object]:
-    """The objects that look different, as they were and as they are; hidden ones do not count."""
-    pairs = ((old, change.objects - change.added), (new, change.objects - change.removed))
-    return [
-        obj
-        for scene, names in pairs
-        for obj in scene.objects
-        if obj.visible and (obj.name in names or obj.material in change.materials)
-    ]
+    """The objects that look different, as they were and as they are; hidden ones do not count, nor does one
+    that is there as before under another name, its own or its material's."""
+    gone = [o for o in old.objects if o.visible and _is_in(o, change, change.added)]
+    come = [o for o in new.objects if o.visible and _is_in(o, change, change.removed)]
+    same = Counter(_look(old, o) for o in gone) & Counter(_look(new, o) for o in come)
+    return [*_without(old, gone, same), *_without(new, come, same)]
+
+
+def _is_in(obj: Object, change: Change, but: frozenset[str]) -> bool:
+    return obj.name in change.objects - but or obj.material in change.materials
+
+
+def _look(scene: Scene, obj: Object) -> tuple[object, ...]:
+    # A mesh is itself only, see Mesh.
+    return id(obj.mesh), obj.position, obj.rotation, obj.scale, scene.materials[obj.material]
+
+
+def _without(scene: Scene, objects: list[Object], same: Counter[tuple[object, ...]]) -> list[Object]:
+    left, found = same.copy(), []
+    for obj in objects:
+        look = _look(scene, obj)
+        if left[look] > 0:
+            left[look] -= 1
+        else:
+            found.append(obj)
+    return found
