@@ -10,6 +10,7 @@ import typer
 from incpt.benchmarks import build, rays, report, scale, sweep, table51
 from incpt.benchmarks.experiment import Stopped
 from incpt.benchmarks.peers import compare
+from incpt.errors import InputError
 
 INTERRUPTED = 130
 
@@ -17,7 +18,6 @@ app = typer.Typer(
     name="incpt bench",
     help="Measure incpt, and other renderers beside it. What is finished is never measured again.",
     add_completion=False,
-    no_args_is_help=True,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -32,9 +32,10 @@ app.command("scale")(scale.scale)
 app.command("report")(report.report)
 
 
-@app.callback()
-def _bench() -> None:
-    """Keeps the names of the commands also where there is one command only."""
+@app.callback(invoke_without_command=True)
+def _bench(context: typer.Context) -> None:
+    if context.invoked_subcommand is None:
+        print(context.get_help())
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -44,4 +45,9 @@ def main(arguments: Sequence[str]) -> int:
     except Stopped as stopped:
         print(f"incpt: {stopped}", file=sys.stderr)
         return INTERRUPTED
+    except Exception as error:
+        if hasattr(error, "format_message"):  # a usage error, as typer or its click raise it
+            message = str(error.format_message()).rstrip(".")
+            raise InputError(f"bench: {message}; see incpt bench --help") from None
+        raise
     return result if isinstance(result, int) else 0

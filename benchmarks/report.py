@@ -16,6 +16,7 @@ from rich.table import Table
 
 from incpt import files
 from incpt.benchmarks import build, options, plots, rays, scale, store, sweep, table51, tables
+from incpt.benchmarks.catalogue import EXPERIMENTS
 from incpt.benchmarks.fit import fitted
 from incpt.benchmarks.peers import compare
 from incpt.benchmarks.store import Results, grouped
@@ -35,24 +36,25 @@ code { font-size: 12px; overflow-wrap: anywhere } .small { color: #555; font-siz
 
 def page(folder: Path) -> str:
     """The whole page. Raises InputError where there are no results."""
-    found = {name: store.read(folder / f"{name}.jsonl").latest() for name in SECTIONS}
+    found = {name: store.read(folder / f"{name}.jsonl").latest() for name in EXPERIMENTS}
     there = {name: results for name, results in found.items() if results.records}
     if not there:
         raise InputError(f"{folder}: no results; measure first, for example with incpt bench sweep")
     parts = ["<h1>incpt: benchmarks</h1>"]
     for name, results in there.items():
-        title, section = SECTIONS[name]
-        parts.append(f'<h2 id="{name}">{escape(title)}</h2>')
-        parts += _context(results)
-        parts += section(results, folder)
+        experiment = EXPERIMENTS[name]
+        parts.append(f'<h2 id="{name}">{escape(experiment.title)}</h2>')
+        parts += _context(results, experiment.timed)
+        parts += _PLOTS[name](results, folder)
+        parts += (html_table(table) for table in experiment.tables(results))
     body = "\n".join(parts)
     head = f'<meta charset="utf-8"><title>incpt: benchmarks</title><style>{_STYLE}</style>'
     return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head>\n<body>\n{body}\n</body></html>\n'
 
 
-def _context(results: Results) -> Iterable[str]:
+def _context(results: Results, timed: bool) -> Iterable[str]:
     """On what it was measured, by which commands, and whether the machine was busy."""
-    for line in tables.notes(results):
+    for line in tables.notes(results, timed):
         kind = "busy" if line.startswith("BUSY") else "small"
         yield f'<p class="{kind}">{escape(line)}</p>'
     for command in dict.fromkeys(record.command for record in results.records if record.command):
@@ -75,7 +77,7 @@ def _figure(drawn: str) -> str:
     return f"<figure>{drawn}</figure>"
 
 
-# ------------------------------------------------------------------------------------------ sections
+# --------------------------------------------------------------------------------- plots and pictures
 
 
 def _sweep(results: Results, folder: Path) -> Iterable[str]:
@@ -85,7 +87,6 @@ def _sweep(results: Results, folder: Path) -> Iterable[str]:
         yield from (
             _figure(drawn) for drawn in _sweep_plots(Results(results.environments, tuple(chosen)), key)
         )
-    yield html_table(sweep.table(results))
 
 
 def _sweep_plots(results: Results, key: tuple[Any, ...]) -> Iterable[str]:
@@ -110,7 +111,6 @@ def _sweep_plots(results: Results, key: tuple[Any, ...]) -> Iterable[str]:
 
 
 def _table51(results: Results, folder: Path) -> Iterable[str]:
-    yield from (html_table(table) for table in table51.tables(results))
     curves = {}
     for variant in table51.VARIANTS:
         record = table51.record_of(results, table51.TABLE_EDIT, variant)
@@ -133,7 +133,6 @@ def _rays(results: Results, folder: Path) -> Iterable[str]:
             if place == scene:
                 groups.setdefault(str(kind), {})[str(tracer)] = summary([v / 1e6 for v in values])
         yield _figure(plots.bars(groups, "million rays per second", str(scene)))
-    yield html_table(rays.table(results))
 
 
 def _peers(results: Results, folder: Path) -> Iterable[str]:
@@ -148,7 +147,6 @@ def _peers(results: Results, folder: Path) -> Iterable[str]:
             groups.setdefault(scene, {})[peer] = summary([factor * v for v in values])
         if groups:
             yield _figure(plots.bars(groups, label, label, logarithmic))
-    yield from (html_table(table) for table in compare.tables(results))
 
 
 def _build(results: Results, folder: Path) -> Iterable[str]:
@@ -161,7 +159,6 @@ def _build(results: Results, folder: Path) -> Iterable[str]:
         }
         if curves:
             yield _figure(plots.lines(curves, what, "ms", f"trees against {what}", laws))
-    yield html_table(build.table(results))
 
 
 def _scale(results: Results, folder: Path) -> Iterable[str]:
@@ -171,18 +168,15 @@ def _scale(results: Results, folder: Path) -> Iterable[str]:
             laws = {} if law is None else {axis.name: law}
             label = "milliseconds of a step"
             yield _figure(plots.lines({axis.name: points}, axis.what, label, axis.name, laws))
-    yield html_table(scale.table(results))
 
 
-Section = Callable[[Results, Path], Iterable[str]]
-
-SECTIONS: dict[str, tuple[str, Section]] = {
-    table51.NAME: ("The thesis's table 5.1 and figures 5.1 to 5.6", _table51),
-    sweep.NAME: ("Tile size, NoR, strategy, bounces", _sweep),
-    compare.NAME: ("Beside other renderers", _peers),
-    rays.NAME: ("Traversal beside Embree", _rays),
-    build.NAME: ("Trees: build, refit, top level", _build),
-    scale.NAME: ("How cost grows", _scale),
+_PLOTS: dict[str, Callable[[Results, Path], Iterable[str]]] = {
+    table51.NAME: _table51,
+    sweep.NAME: _sweep,
+    compare.NAME: _peers,
+    rays.NAME: _rays,
+    build.NAME: _build,
+    scale.NAME: _scale,
 }
 
 

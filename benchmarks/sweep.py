@@ -25,7 +25,7 @@ from incpt.benchmarks.tables import print_table
 from incpt.benchmarks.timing import interleaved, summary
 from incpt.device import Device
 from incpt.edit_script import Edit, EditScript, load_edits
-from incpt.errors import InputError
+from incpt.errors import InputError, in_place
 from incpt.replay import Variant, variants
 from incpt.settings import STRATEGIES, RenderSettings
 
@@ -193,7 +193,8 @@ def sweep(
         base_spp or (128 if quick else 1024),
         reference_spp or (512 if quick else 4096),
     )
-    cases(script, settings, grid)  # says which number is out of range before anything is rendered
+    with in_place("--tile, --nor or --max-bounces"):  # before anything is rendered
+        cases(script, settings, grid)
     opened = Device(device)
     store = Store(output, NAME)
     gallery = Gallery(output / "references", opened)

@@ -28,9 +28,9 @@ def print_table(tables: Table | Sequence[Table], results: Results, store: Store)
     print(f"{store.folder}: {names}")
 
 
-def notes(results: Results) -> list[str]:
+def notes(results: Results, timed: bool = True) -> list[str]:
     """On what the results were measured, one line for each machine and device, and a warning if it was
-    busy."""
+    busy; results that are not `timed` do not depend on that."""
     lines = []
     for key in dict.fromkeys(record.environment for record in results.records):
         environment = results.environments.get(key, {})
@@ -39,7 +39,7 @@ def notes(results: Results) -> list[str]:
         device = environment.get("device")
         what = f"{place}; {device}; " if device else f"{place}; "
         lines.append(what + f"commit {environment.get('commit', 'unknown')}; {len(records)} measurements")
-        if warning := busy_warning(results, key):
+        if timed and (warning := busy_warning(results, key)):
             lines.append(warning)
     return lines
 

@@ -11,6 +11,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from incpt.benchmarks.peers.peer import FloatImage, Job, MissingPeer, make
+from incpt.device import DEVICE_VARIABLE
 from incpt.errors import one_line
 from incpt.scene import Vector
 
@@ -18,14 +19,14 @@ _START_S = 300.0
 
 
 class Worker:
-    """The renderer `name`, with `threads` of its own. Implements Peer. Raises MissingPeer where it is not
-    installed, and where its process ends before its time."""
+    """The renderer `name`, with `threads` of its own; incpt on the `device` of that name. Implements Peer.
+    Raises MissingPeer where it is not installed, and where its process ends before its time."""
 
-    def __init__(self, name: str, threads: int) -> None:
+    def __init__(self, name: str, threads: int, device: str | None = None) -> None:
         self.name = name
         context = multiprocessing.get_context("spawn")
         self._pipe, other = context.Pipe()
-        self._process = context.Process(target=_serve, args=(name, threads, other), daemon=True)
+        self._process = context.Process(target=_serve, args=(name, threads, device, other), daemon=True)
         self._process.start()
         other.close()
         try:
@@ -72,9 +73,11 @@ class Worker:
         return answer
 
 
-def _serve(name: str, threads: int, pipe: Connection) -> None:
+def _serve(name: str, threads: int, device: str | None, pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
     os.environ["POCL_MAX_PTHREAD_COUNT"] = str(threads)
+    if device is not None:
+        os.environ[DEVICE_VARIABLE] = device
     # Blender tells of every frame on stdout, which is for results.
     sys.stdout.flush()
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
