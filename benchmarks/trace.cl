@@ -2,12 +2,13 @@
 // in six planes; a limit of infinity asks for whatever is nearest. Included after bvh.cl.
 
 #define GEOMETRY_PARAMETERS                                                                                  \
-    __global const Node *top_nodes, __global const Node *nodes, __global const TrianglePack *packs,          \
-        __global const Object *objects
+    __global const Node *top_nodes, __global const TrianglePack *top_packs, __global const Node *nodes,      \
+        __global const TrianglePack *packs, __global const Object *objects
+#define GEOMETRY top_nodes, top_packs, nodes, packs, objects
 
 INLINE bool trace_one(uint k, uint count, __global const float *rays, GEOMETRY_PARAMETERS, const bool any,
                       BvhHit *hit) {
-    const Geometry geometry = {top_nodes, nodes, packs, objects};
+    const Geometry geometry = {GEOMETRY, 0};
     float origin[3], direction[3];
     for (uint i = 0; i < 3; i++) {
         origin[i] = rays[i * count + k];
@@ -24,7 +25,7 @@ trace_closest(const uint count, __global const float *rays, __global const float
         return;
     BvhHit hit;
     hit.distance = limits[k];
-    const bool found = trace_one(k, count, rays, top_nodes, nodes, packs, objects, false, &hit);
+    const bool found = trace_one(k, count, rays, GEOMETRY, false, &hit);
     distances[k] = found ? hit.distance : INFINITY;
 }
 
@@ -38,7 +39,7 @@ __kernel __attribute__((vec_type_hint(float8))) void trace_any(const uint count,
         return;
     BvhHit hit;
     hit.distance = limits[k];
-    distances[k] = trace_one(k, count, rays, top_nodes, nodes, packs, objects, true, &hit) ? 1.0f : 0.0f;
+    distances[k] = trace_one(k, count, rays, GEOMETRY, true, &hit) ? 1.0f : 0.0f;
 }
 
 #ifdef COUNT_VISITS
@@ -53,9 +54,9 @@ count_visits(const uint count, const uint any, __global const float *rays, __glo
     hit.distance = limits[k];
     hit.visits = hit.tests = 0;
     if (any)
-        trace_one(k, count, rays, top_nodes, nodes, packs, objects, true, &hit);
+        trace_one(k, count, rays, GEOMETRY, true, &hit);
     else
-        trace_one(k, count, rays, top_nodes, nodes, packs, objects, false, &hit);
+        trace_one(k, count, rays, GEOMETRY, false, &hit);
     visits[2 * k] = hit.visits;
     visits[2 * k + 1] = hit.tests;
 }

@@ -51,7 +51,7 @@ class Tracer:
 
     def __init__(self, device: Device, scene: Scene) -> None:
         self.device = device
-        self._buffers = DeviceScene(device, scene).geometry[:4]
+        self._buffers = DeviceScene(device, scene).geometry[:5]
         own = (resources.files("incpt.benchmarks") / "trace.cl").read_text("utf-8")
         text = device.program_text("bvh")
         program = _built(device, f"{text}\n{own}")

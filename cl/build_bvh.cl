@@ -232,12 +232,14 @@ static void write_face(__global TrianglePack *pack, uint lane_index, __global co
         pack->vertex[3 * corner + 2][lane_index] = flat ? NAN : vertex[corner].z;
     }
     pack->face[lane_index] = face;
+    pack->object[lane_index] = NO_INDEX;
 }
 
 static void clear_lane(__global TrianglePack *pack, uint lane_index) {
     for (uint i = 0; i < 9; i++)
         pack->vertex[i][lane_index] = NAN;
     pack->face[lane_index] = NO_INDEX;
+    pack->object[lane_index] = NO_INDEX;
 }
 
 __kernel void bound_faces(const uint count, __global const int *faces, __global const float *vertices,

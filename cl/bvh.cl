@@ -10,6 +10,7 @@
 #include "scalar.cl"
 
 #define BVH_STACK_SIZE ((BVH_WIDTH - 1) * BVH_MAX_DEPTH + 1)
+#define BVH_TOP_STACK_SIZE (2 * BVH_STACK_SIZE) // a tree of objects may go on as one of triangles
 #define BVH_PLANE_BYTES (BVH_WIDTH * sizeof(float))
 #define BVH_MIN8(a, b) ((a) < (b) ? (a) : (b))
 #define BVH_MAX8(a, b) ((a) > (b) ? (a) : (b))
@@ -31,12 +32,15 @@
 #define BVH_LIKELY(x) (x)
 #endif
 
-// Everything that rays can meet; trees and packs of all meshes stand one after the other.
+// Everything that rays can meet: the top level over objects and over the triangles of small meshes, which lie
+// in its packs in world space, and the trees and packs of the other meshes, one after the other.
 typedef struct {
     __global const Node *top_nodes;
+    __global const TrianglePack *top_packs;
     __global const Node *nodes;
     __global const TrianglePack *packs;
     __global const Object *objects;
+    __global const float *normals; // of the corners of faces, mesh by mesh; for `describe_path` alone
 } Geometry;
 
 // A ray in the space of one tree, prepared for its tests. Axis z of the triangle test is the direction's
@@ -296,13 +300,20 @@ INLINE BvhRay bvh_object_ray(__global const Object *object, const float *origin,
     return bvh_ray(object_origin, object_direction);
 }
 
+INLINE bool bvh_trace_object(const Geometry *geometry, __global const Object *object, const float *origin,
+                             const float *direction, const bool any, BvhHit *hit) {
+    const BvhRay ray = bvh_object_ray(object, origin, direction);
+    return bvh_trace_mesh(&ray, geometry->nodes + object->first_node, geometry->packs + object->first_pack,
+                          any, hit);
+}
+
 // Nearest hit of the scene with 0 < t < hit->distance, else object is NO_INDEX; any one of them if `any`,
 // which fills nothing in.
 INLINE bool bvh_trace(const Geometry *geometry, const float *origin, const float *direction, const bool any,
                       BvhHit *hit) {
     __global const Node *top_nodes = geometry->top_nodes;
     const BvhRay ray = bvh_ray(origin, direction);
-    ulong stack[BVH_STACK_SIZE];
+    ulong stack[BVH_TOP_STACK_SIZE];
     uint height = 0, reference = 0;
     hit->object = NO_INDEX;
     for (;;) {
@@ -313,18 +324,26 @@ INLINE bool bvh_trace(const Geometry *geometry, const float *origin, const float
                 reference = bvh_push(top_nodes + reference, lanes, entry, stack, &height);
                 continue;
             }
+        } else if (reference & NODE_PACK) {
+            float8 distance, weight[3];
+            const uint pack = reference & ~(NODE_LEAF | NODE_PACK);
+            const uint lanes =
+                bvh_triangles(&ray, geometry->top_packs + pack, hit->distance, &distance, weight);
+            if (lanes) {
+                if (any)
+                    return true;
+                if (bvh_keep(pack, lanes, distance, weight, hit)) {
+                    hit->object = geometry->top_packs[pack].object[hit->triangle % BVH_WIDTH];
+                    hit->triangle |= NODE_PACK;
+                }
+            }
         } else {
             __global const Object *object = geometry->objects + (reference & ~NODE_LEAF);
-            if (object->visible) {
-                const BvhRay object_ray = bvh_object_ray(object, origin, direction);
-                __global const Node *object_nodes = geometry->nodes + object->first_node;
-                __global const TrianglePack *object_packs = geometry->packs + object->first_pack;
-                if (bvh_trace_mesh(&object_ray, object_nodes, object_packs, any, hit)) {
-                    if (any)
-                        return true;
-                    hit->object = reference & ~NODE_LEAF;
-                    hit->triangle += object->first_pack * BVH_WIDTH;
-                }
+            if (object->visible && bvh_trace_object(geometry, object, origin, direction, any, hit)) {
+                if (any)
+                    return true;
+                hit->object = reference & ~NODE_LEAF;
+                hit->triangle += object->first_pack * BVH_WIDTH;
             }
         }
         const ulong limit = bvh_entry(NODE_EMPTY, hit->distance);

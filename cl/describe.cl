@@ -4,6 +4,13 @@
 // What the surface is like where a ray met it: position, normals, material, rounding bound. Straight-line
 // code of scalars, so that PoCL runs it in SIMD lanes.
 
+// Scenes that need less have variants that do less: ALL_ON_TOP where every triangle lies in the packs of the
+// top level, in world space, and FLAT where no mesh has normals.
+
+// The unit vector along v, which is scaled before it is squared, because squares of very small or large
+// components would leave the range of a float.
+INLINE Vec3 safe_unit(Vec3 v) { return unit(scaled(bvh_scale(bvh_largest(v)), v)); }
+
 // A normal of object space in world space: by the inverse transpose, which keeps the outside outside, also
 // where the object is mirrored. Scaled before it is squared, because squares of very small or large
 // components would leave the range of a float.
@@ -12,7 +19,7 @@ INLINE Vec3 world_normal(__global const Object *object, Vec3 normal) {
     Vec3 v = vec3(m[0] * normal.x + m[4] * normal.y + m[8] * normal.z,
                   m[1] * normal.x + m[5] * normal.y + m[9] * normal.z,
                   m[2] * normal.x + m[6] * normal.y + m[10] * normal.z);
-    return unit(scaled(bvh_scale(bvh_largest(v)), v));
+    return safe_unit(v);
 }
 
 INLINE Vec3 world_point(__global const Object *object, Vec3 p) {
@@ -57,27 +64,41 @@ INLINE Vec3 leave_edge(Vec3 centroid, float offset, Vec3 position) {
 }
 
 // Fills in the planes of a hit of which `trace_path` has left the distance, the object, the place of the
-// triangle among all packs, and the weights of its corners, up to a common factor, in place of the position.
-INLINE void describe_path(__global const TrianglePack *packs, __global const Object *objects,
-                          __global const float *normals, const State *state, uint path) {
+// triangle, and the weights of its corners, up to a common factor, in place of the position.
+INLINE void describe_path(const Geometry *geometry, const State *state, uint path) {
     uint stride = state->stride;
-    __global const Object *object = objects + load_bits(state->hits, HIT_OBJECT * stride + path);
+    __global const Object *object = geometry->objects + load_bits(state->hits, HIT_OBJECT * stride + path);
     uint place = load_bits(state->hits, HIT_TRIANGLE * stride + path);
-    __global const TrianglePack *pack = packs + place / BVH_WIDTH;
+#ifdef ALL_ON_TOP
+    __global const TrianglePack *packs = geometry->top_packs;
+#else
+    int on_top = (place & NODE_PACK) != 0u;
+    __global const TrianglePack *packs = on_top ? geometry->top_packs : geometry->packs;
+#endif
+    __global const TrianglePack *pack = packs + (place & ~NODE_PACK) / BVH_WIDTH;
     uint lane = place % BVH_WIDTH;
     uint face = pack->face[lane];
     Vec3 a = pack_vertex(pack, 0, lane), b = pack_vertex(pack, 1, lane), c = pack_vertex(pack, 2, lane);
     Vec3 weight = load3(state->hits + HIT_POSITION_X * stride, stride, path);
     weight = scaled(1.0f / (weight.x + weight.y + weight.z), weight);
-    Vec3 point = add(scaled(weight.x, a), add(scaled(weight.y, b), scaled(weight.z, c)));
-    Vec3 position = world_point(object, point);
-    Vec3 centroid = world_point(object, scaled(1.0f / 3.0f, add(a, add(b, c))));
-    Vec3 geometric = world_normal(object, bvh_normal(a, b, c));
+    Vec3 position = add(scaled(weight.x, a), add(scaled(weight.y, b), scaled(weight.z, c)));
+    Vec3 centroid = scaled(1.0f / 3.0f, add(a, add(b, c)));
+    Vec3 normal = bvh_normal(a, b, c);
+    Vec3 geometric = scaled(object->winding, safe_unit(normal));
+#ifndef ALL_ON_TOP
+    position = choose(on_top, position, world_point(object, position));
+    centroid = choose(on_top, centroid, world_point(object, centroid));
+    geometric = choose(on_top, geometric, world_normal(object, normal));
+#endif
     float offset = offset_bound(object, geometric);
     store3(state->hits + HIT_POSITION_X * stride, stride, path, leave_edge(centroid, offset, position));
     store3(state->hits + HIT_GEOMETRIC_X * stride, stride, path, geometric);
+#ifdef FLAT
+    store3(state->hits + HIT_SHADING_X * stride, stride, path, geometric);
+#else
     store3(state->hits + HIT_SHADING_X * stride, stride, path,
-           shading_normal(object, normals, face, weight, geometric));
+           shading_normal(object, geometry->normals, face, weight, geometric));
+#endif
     state->hits[HIT_OFFSET * stride + path] = offset;
     store_bits(state->hits, HIT_MATERIAL * stride + path, object->material);
     store_bits(state->hits, HIT_TRIANGLE * stride + path, face);

@@ -7,16 +7,17 @@
 // triangles.
 __kernel __attribute__((vec_type_hint(float8))) void
 intersect(const Params params, const uint count, __global const uint *list, __global const Node *top_nodes,
-          __global const Node *nodes, __global const TrianglePack *packs, __global const Object *objects,
+          __global const TrianglePack *top_packs, __global const Node *nodes,
+          __global const TrianglePack *packs, __global const Object *objects,
           __global const Material *materials, __global const float *normals, __global float *rays,
           __global float *paths, __global float *hits) {
     if (get_global_id(0) >= count)
         return;
     const uint path = list[get_global_id(0)];
     const State state = {rays, paths, hits, 0, 0, params.path_stride, params.buffer_stride};
-    const Geometry geometry = {top_nodes, nodes, packs, objects};
+    const Geometry geometry = {top_nodes, top_packs, nodes, packs, objects, normals};
     if (trace_path(&geometry, &state, path, path)) {
-        describe_path(packs, objects, normals, &state, path);
+        describe_path(&geometry, &state, path);
         store_bits(paths, PATH_CLASS * state.stride + path, surface_class(materials, &state, path));
     } else {
         store_bits(paths, PATH_CLASS * state.stride + path, CLASS_ESCAPED);

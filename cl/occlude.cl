@@ -12,13 +12,14 @@ INLINE void occlude_path(const Geometry *geometry, const State *state, uint path
 // triangles.
 __kernel __attribute__((vec_type_hint(float8))) void
 occlude(const Params params, const uint count, __global const uint *list, __global const Node *top_nodes,
-        __global const Node *nodes, __global const TrianglePack *packs, __global const Object *objects,
-        __global float *shadows, __global float *radiance) {
+        __global const TrianglePack *top_packs, __global const Node *nodes,
+        __global const TrianglePack *packs, __global const Object *objects, __global float *shadows,
+        __global float *radiance) {
     if (get_global_id(0) >= count)
         return;
     const uint path = list[get_global_id(0)];
     const State state = {0, 0, 0, shadows, radiance, params.path_stride, params.buffer_stride};
-    const Geometry geometry = {top_nodes, nodes, packs, objects};
+    const Geometry geometry = {top_nodes, top_packs, nodes, packs, objects, 0};
     occlude_path(&geometry, &state, path, params.first_path + path);
 }
 #endif

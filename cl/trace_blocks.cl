@@ -64,7 +64,8 @@ INLINE void move_paths(const State *state, __local const uint *list, uint count)
 
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
 trace_blocks(const Params params, __global const Slot *slots, __global const Node *top_nodes,
-             __global const Node *nodes, __global const TrianglePack *packs, __global const Object *objects,
+             __global const TrianglePack *top_packs, __global const Node *nodes,
+             __global const TrianglePack *packs, __global const Object *objects,
              __global const Material *materials, __global const float *normals, __global const float *layers,
              __global const float *lights, __global const float *environment_image,
              __global const float *environment_marginal, __global const float *environment_conditional,
@@ -72,7 +73,7 @@ trace_blocks(const Params params, __global const Slot *slots, __global const Nod
              __local float *hits, __local float *shadows, __local float *radiance, __local uint *list,
              __local uint *escaped, __global float *path_buffer) {
     const State state = {rays, paths, hits, shadows, radiance, BLOCK_PATHS, BLOCK_PATHS};
-    const Geometry geometry = {top_nodes, nodes, packs, objects};
+    const Geometry geometry = {top_nodes, top_packs, nodes, packs, objects, normals};
     const Emitters emitters = {
         materials, lights, environment_image, environment_marginal, environment_conditional, environment_pdf};
     const uint first = (uint)get_group_id(0) * BLOCK_PATHS;
@@ -97,7 +98,7 @@ trace_blocks(const Params params, __global const Slot *slots, __global const Nod
         move_paths(&state, list, count);
         LANES
         for (int i = 0; i < (int)count; i++)
-            describe_path(packs, objects, normals, &state, i);
+            describe_path(&geometry, &state, i);
 
 #ifndef MEDIA
         // Every ray is a scattering event, so that all paths end with the same one.

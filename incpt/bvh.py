@@ -58,11 +58,18 @@ def build_mesh(device: Device, mesh: Mesh) -> Bvh:
 
     Raises DeviceError where the device's memory runs out.
     """
-    count = len(mesh.faces)
-    vertices, faces = device.upload(mesh.vertices), device.upload(mesh.faces)
+    return build_triangles(device, mesh.vertices, mesh.faces)
+
+
+def build_triangles(device: Device, vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int32]) -> Bvh:
+    """The tree of `faces` (F, 3), indices of `vertices` (V, 3); see `build_mesh`."""
+    count = len(faces)
+    vertex_buffer, face_buffer = device.upload(vertices), device.upload(faces)
     boxes = device.empty(count * 32)
-    device.launch(device.kernel("bound_faces", _FILE), count, np.uint32(count), faces, vertices, boxes)
-    return _build(device, count, layout.BVH_WIDTH, boxes, faces, vertices)
+    device.launch(
+        device.kernel("bound_faces", _FILE), count, np.uint32(count), face_buffer, vertex_buffer, boxes
+    )
+    return _build(device, count, layout.BVH_WIDTH, boxes, face_buffer, vertex_buffer)
 
 
 def refit_mesh(device: Device, bvh: Bvh, mesh: Mesh) -> Bvh:
@@ -99,6 +106,37 @@ def build_top(device: Device, bounds: npt.NDArray[np.floating[Any]]) -> Bvh:
     boxes[:, 4:7] = -np.nextafter(bounds[:, 1].astype(np.float32), infinity)
     boxes[:, 3] = np.arange(len(bounds), dtype=np.uint32).view(np.float32)
     return _build(device, len(bounds), 1, device.upload(boxes))
+
+
+def build_top_with_triangles(
+    device: Device,
+    bounds: npt.NDArray[np.floating[Any]],
+    objects: npt.NDArray[np.integer[Any]],
+    triangles: Bvh | None,
+) -> npt.NDArray[np.void]:
+    """Nodes of the top level over `objects`, indices (N,) with world-space bounds (N, 2, 3), and over the
+    packs of `triangles`, a tree in world space, which becomes a branch of the top level."""
+    if triangles is None:
+        return _with_leaves(build_top(device, bounds), objects)
+    packs = _with_leaves(triangles, np.arange(len(triangles.packs)) | layout.NODE_PACK)
+    if len(objects) == 0:
+        return packs
+    both = np.concatenate([bounds, triangles.bounds[None]])
+    nodes = _with_leaves(build_top(device, both), np.append(objects, layout.NODE_PACK))
+    # The leaf that stands for all triangles becomes the root of their tree.
+    nodes["child"][nodes["child"] == layout.NODE_LEAF | layout.NODE_PACK] = len(nodes)
+    inner = packs["child"] < layout.NODE_PACK
+    packs["child"][inner] += np.uint32(len(nodes))
+    return np.concatenate([nodes, packs])
+
+
+def _with_leaves(tree: Bvh, references: npt.NDArray[np.integer[Any]]) -> npt.NDArray[np.void]:
+    """The nodes of a tree whose leaf i refers to references[i]."""
+    nodes = tree.nodes.copy()
+    child = nodes["child"]
+    leaves = (child >= layout.NODE_LEAF) & (child != layout.NODE_EMPTY)
+    child[leaves] = references[child[leaves] & ~np.uint32(layout.NODE_LEAF)] | layout.NODE_LEAF
+    return nodes
 
 
 def position_error(

@@ -17,7 +17,13 @@ import pyopencl as cl
 
 from incpt import albedo, bvh, layout, lights, transform
 from incpt.device import Device
-from incpt.scene import Change, Mesh, Scene, Vector, diff
+from incpt.scene import Change, Mesh, Object, Scene, Vector, diff
+
+
+_NOT_MOVED = np.eye(3, 4)
+_MOST_FACES_ON_TOP = 512
+_MOST_FACES_IN_ALL_ON_TOP = 4096
+"""Of one object, and of all, that stand in the top level themselves."""
 
 
 class DeviceScene:
@@ -56,13 +62,16 @@ class DeviceScene:
 
     @property
     def variant(self) -> tuple[str, ...]:
-        """What chooses the variants of all kernels that this scene needs."""
-        return (*self.features, *(("MEDIA",) if self.has_media else ()))
+        """What chooses the variants of all kernels that this scene needs: what there is, and what is left out
+        of describing a hit."""
+        names = {"MEDIA": self.has_media, "ALL_ON_TOP": self._all_on_top, "FLAT": self._flat}
+        return (*self.features, *(name for name, holds in names.items() if holds))
 
     @property
     def geometry(self) -> tuple[cl.Buffer, ...]:
-        """What traversal reads: top nodes, nodes, packs, objects, materials."""
-        return tuple(self._buffers[n] for n in ("top_nodes", "nodes", "packs", "objects", "materials"))
+        """What traversal reads: top nodes and packs, nodes, packs, objects, materials."""
+        names = ("top_nodes", "top_packs", "nodes", "packs", "objects", "materials")
+        return tuple(self._buffers[n] for n in names)
 
     @property
     def emitters(self) -> tuple[cl.Buffer, ...]:
@@ -115,23 +124,60 @@ class DeviceScene:
         self._upload("nodes", _joined([tree.nodes for tree in trees], layout.NODE))
         self._upload("packs", _joined([tree.packs for tree in trees], layout.TRIANGLE_PACK))
         self._upload("normals", _joined(normals, np.dtype(np.float32)))
+        self._flat = not normals
 
     def _build_objects(self) -> None:
         objects = self.scene.objects
         index = {name: i for i, name in enumerate(self.scene.materials)}
+        on_top = _objects_on_top(objects)
+        vertices = {
+            i: transform.apply_affine(
+                objects[i].world_from_object, objects[i].mesh.vertices.astype(np.float64)
+            ).astype(np.float32)
+            for i in on_top
+        }
         rows = np.zeros(len(objects), layout.OBJECT)
-        for row, obj in zip(rows, objects, strict=True):
+        for i, (row, obj) in enumerate(zip(rows, objects, strict=True)):
             matrix = obj.world_from_object
             row["world_from_object"] = matrix.ravel()
             inverse = transform.invert_affine(matrix)
             row["object_from_world"] = inverse.ravel()
-            row["position_error"] = bvh.position_error(obj.mesh.bounds, matrix, inverse)
+            if i in vertices:
+                bounds = np.stack([vertices[i].min(axis=0), vertices[i].max(axis=0)])
+                row["position_error"] = bvh.position_error(bounds, _NOT_MOVED, _NOT_MOVED)
+            else:
+                row["position_error"] = bvh.position_error(obj.mesh.bounds, matrix, inverse)
             row["first_node"], row["first_pack"], row["first_normal"] = self._places[obj.mesh]
             row["material"] = index[obj.material]
             row["visible"] = obj.visible
-        bounds = np.array([obj.world_bounds for obj in objects]).reshape(-1, 2, 3)
+            row["winding"] = np.sign(np.linalg.det(matrix[:, :3]))
         self._upload("objects", rows)
-        self._upload("top_nodes", bvh.build_top(self.device, bounds).nodes)
+        self._build_top(vertices)
+
+    def _build_top(self, vertices: dict[int, npt.NDArray[np.float32]]) -> None:
+        """The top level; `vertices` are those in world space of the objects whose triangles are part of it."""
+        objects = self.scene.objects
+        others = np.array([i for i in range(len(objects)) if i not in vertices], np.int64)
+        bounds = np.array([objects[i].world_bounds for i in others]).reshape(-1, 2, 3)
+        triangles = None
+        if vertices:
+            firsts = np.cumsum([0, *(len(v) for v in vertices.values())])
+            faces = [objects[i].mesh.faces + first for i, first in zip(vertices, firsts, strict=False)]
+            triangles = bvh.build_triangles(
+                self.device, np.concatenate(list(vertices.values())), np.concatenate(faces).astype(np.int32)
+            )
+            face = triangles.packs["face"]
+            used = face != layout.NO_INDEX
+            counts = [len(f) for f in faces]
+            owner = np.repeat(np.array(list(vertices), np.uint32), counts)
+            own_face = np.concatenate([np.arange(n, dtype=np.uint32) for n in counts])
+            triangles.packs["object"][used] = owner[face[used]]
+            face[used] = own_face[face[used]]
+        self._upload("top_nodes", bvh.build_top_with_triangles(self.device, bounds, others, triangles))
+        self._upload(
+            "top_packs", triangles.packs if triangles is not None else np.zeros(1, layout.TRIANGLE_PACK)
+        )
+        self._all_on_top = len(others) == 0
 
     def _build_environment(self) -> None:
         image = self.scene.environment.image
@@ -191,6 +237,15 @@ def _emission_changed(change: Change) -> bool:
     # Whatever may touch an emissive triangle; cheap where there are few of them.
     return bool(change.objects or change.materials or change.environment or change.environment_image
                 or change.materials_added_or_removed)  # fmt: skip
+
+
+def _objects_on_top(objects: Sequence[Object]) -> list[int]:
+    """The objects whose triangles become part of the top level, smallest first: rays need no way into the space of
+    the object then. Only so many that moving one costs milliseconds."""
+    small = [i for i, obj in enumerate(objects) if obj.visible and len(obj.mesh.faces) <= _MOST_FACES_ON_TOP]
+    small.sort(key=lambda i: len(objects[i].mesh.faces))
+    total = np.cumsum([len(objects[i].mesh.faces) for i in small])
+    return small[: int(np.searchsorted(total, _MOST_FACES_IN_ALL_ON_TOP, side="right"))]
 
 
 # What is rebuilt, and by which changes; in this order, since lights need the environment and materials

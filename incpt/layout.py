@@ -28,6 +28,9 @@ NODE_EMPTY = 0xFFFFFFFF
 """Child reference of an unused place in a node (its box is inverted, so that no ray enters it)."""
 NODE_LEAF = 0x80000000
 """Flag of a child reference: the other bits are a pack (bottom level) or an object (top level)."""
+NODE_PACK = 0x40000000
+"""Flag of a leaf of the top level that is a pack of triangles in world space and no object. Also marks the place
+of a hit in such a pack."""
 NO_INDEX = 0xFFFFFFFF
 """'None' for every unsigned index: no hit, no triangle, no normals, no medium."""
 
@@ -208,6 +211,8 @@ TRIANGLE_PACK = _packed(
         # Index of the face in its mesh, NO_INDEX for an unused lane. Vertices are NaN there and
         # where a face has no area: no comparison with them holds, so that no ray meets them.
         ("face", np.uint32, (BVH_WIDTH,)),
+        # Index of its object where triangles of several stand together, in world space; else NO_INDEX.
+        ("object", np.uint32, (BVH_WIDTH,)),
     ]
 )
 
@@ -221,6 +226,10 @@ OBJECT = _packed(
         ("first_normal", np.uint32),  # float index of the mesh's corner normals, or NO_INDEX: flat faces
         ("material", np.uint32),
         ("visible", np.uint32),
+        (
+            "winding",
+            np.float32,
+        ),  # -1 where the matrix mirrors, so that faces turn round in world space; else 1
     ]
 )
 

@@ -204,7 +204,7 @@ class Wavefront:
         self._launch(
             "escape", count, params, np.uint32(count), self._escaped, scene.buffer("materials"),
             scene.buffer("environment_image"), scene.buffer("texel_pdf"), self._rays, self._paths, radiance,
-            features=scene.variant,
+            features=(*scene.features, *(("MEDIA",) if scene.has_media else ())),
         )  # fmt: skip
 
     def _shade(
@@ -225,7 +225,7 @@ class Wavefront:
         self, scene: DeviceScene, params: npt.NDArray[np.void], count: int, radiance: cl.Buffer
     ) -> None:
         self._launch(
-            "occlude", count, params, np.uint32(count), self._shadowed, *scene.geometry[:4], self._shadows,
+            "occlude", count, params, np.uint32(count), self._shadowed, *scene.geometry[:5], self._shadows,
             radiance,
         )  # fmt: skip
 

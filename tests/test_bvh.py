@@ -76,7 +76,13 @@ class World:
         material = np.zeros(1, layout.MATERIAL)
         material["flags"] = self.material_flags
         upload = self.device.upload
-        tables = [top.nodes, np.concatenate(nodes or [top.nodes]), np.concatenate(packs or [np.zeros(1)])]
+        no_packs = np.zeros(1, layout.TRIANGLE_PACK)
+        tables = [
+            top.nodes,
+            no_packs,
+            np.concatenate(nodes or [top.nodes]),
+            np.concatenate(packs or [np.zeros(1)]),
+        ]
         self.tables = [upload(table) for table in (*tables, records, material)]
         self.normals = upload(np.concatenate(normals))
 
@@ -85,7 +91,7 @@ class World:
         params["path_stride"] = params["buffer_stride"] = count
         kernel = self.device.kernel(name)
         path_list = self.device.upload(np.arange(count, dtype=np.uint32))
-        tables = self.tables[: 4 if name == "occlude" else 5]
+        tables = self.tables[: 5 if name == "occlude" else 6]
         self.device.launch(kernel, count, params, np.uint32(count), path_list, *tables, *buffers)
 
     def intersect(self, origins: Floats, directions: Floats, medium: int = layout.NO_INDEX) -> Hits:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from small_scenes import mixed_scene, small_settings
 
+from incpt import device_scene
 from incpt.device import Device
 from incpt.errors import DeviceError, InputError
 from incpt.modes import Mode
@@ -518,3 +519,28 @@ def test_render_reports_every_step(device: Device) -> None:
     Session(mixed_scene(), device=device).render(3, reports.append)
     assert [report.mode for report in reports] == [Mode.BASE, Mode.REFINE, Mode.REFINE]
     assert all(report.paths == 24 * 64 and report.seconds > 0 for report in reports)
+
+
+@pytest.mark.parametrize(("of_one", "of_all"), [(0, 0), (512, 20), (10000, 100000)])
+def test_triangles_on_top_look_like_objects(
+    device: Device, monkeypatch: pytest.MonkeyPatch, of_one: int, of_all: int
+) -> None:
+    """Small meshes lie in the top level in world space; how many do changes nothing but speed."""
+    scene = mixed_scene().with_object("red cube", scale=(-1, 1, 0.5))
+    scene = scene.with_object("grey drum", scale=(0.7, -0.8, 0.7), rotation=(10, 20, 30))
+    scene = scene.with_added(Object("hidden", shape("cube"), "red", scale=(3, 3, 3), visible=False))
+    expected = Session(scene, device=device)
+    expected.render(8)
+    monkeypatch.setattr(device_scene, "_MOST_FACES_ON_TOP", of_one)
+    monkeypatch.setattr(device_scene, "_MOST_FACES_IN_ALL_ON_TOP", of_all)
+    session = Session(scene, device=device)
+    session.render(8)
+    difference = np.abs(session.image() - expected.image())
+    assert np.median(difference) < 1e-5
+    assert session.image().mean() == pytest.approx(expected.image().mean(), rel=1e-2)
+    actual, wanted = session.aovs(), expected.aovs()
+    same = actual.object_id == wanted.object_id
+    assert same.mean() > 0.999
+    np.testing.assert_allclose(actual.normal[same], wanted.normal[same], atol=1e-3)
+    seen = same & (actual.object_id >= 0)
+    np.testing.assert_allclose(actual.depth[seen], wanted.depth[seen], rtol=1e-4)
