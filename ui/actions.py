@@ -14,6 +14,7 @@ from incpt.ui import camera_moves, clipboard, objects
 from incpt.ui.dialogs import About, Choice, PathDialog, Question, TextField
 from incpt.ui.document import Document, collected_warnings
 from incpt.ui.editor import Editor
+from incpt.ui.recovery import Recovery, find_left_behind
 from incpt.ui.renderer import Export, Pin
 from incpt.ui.selection import Selection
 
@@ -121,6 +122,22 @@ def quit_(editor: Editor) -> None:
         editor.is_closing = True
 
     _when_saved(editor, close)
+
+
+def offer_recovery(editor: Editor, kept: Recovery) -> None:
+    """Ask what to do with the latest of what crashes left behind, where there is something."""
+    found = next(iter(find_left_behind()), None)
+    if found is None:
+        return
+    editor.dialog = Question(
+        "Recover",
+        f"The editor ended without saving {found.name}. Open what it had on {found.saved_at}?",
+        (
+            Choice("Recover", lambda: editor.start_over(kept.recover(found))),
+            Choice("Discard", found.remove),
+            Choice("Later", lambda: None),
+        ),
+    )
 
 
 def _when_saved(editor: Editor, then: Callable[[], object]) -> None:

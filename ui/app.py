@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,6 @@ from imgui_bundle import imgui, implot
 from incpt.errors import OutputError
 from incpt.live import Frame
 from incpt.ui import actions, preferences, recovery
-from incpt.ui.dialogs import Choice, Question
 from incpt.ui.display import Display
 from incpt.ui.document import Document
 from incpt.ui.editor import Editor
@@ -54,7 +52,7 @@ class App:
         self._rect: Rect = (0.0, 0.0, 1.0, 1.0)
         self.shown_frame: Frame | None = None
         self._kept = kept
-        self._offer_recovery()
+        actions.offer_recovery(self.editor, self.recovery)
 
     def run(self) -> None:
         """The loop, until the window is closed."""
@@ -69,9 +67,11 @@ class App:
         editor = self.editor
         wait = 0.0 if editor.is_flying else _WAITING_SECONDS if editor.is_waiting else _IDLE_SECONDS
         is_due = self.window.wait(wait)
-        if editor.receive():
-            self.window.redraw()
+        if received := editor.receive():
             is_due = True
+            # A picture moves no widget: one frame shows it.
+            if not all(isinstance(message, Frame) for message in received):
+                self.window.redraw()
         if is_due or editor.is_waiting or self._has_message_ended():
             self.frame()
         self._autosave()
@@ -141,23 +141,6 @@ class App:
 
     def _autosave(self) -> None:
         self.editor.attempt(lambda: self.recovery.update(self.editor.document, self.editor.now()))
-
-    def _offer_recovery(self) -> None:
-        editor = self.editor
-        for found in recovery.find_left_behind():
-            editor.dialog = Question(
-                "Recover",
-                f"The editor ended without saving {found.name}. Open what it had on {found.saved_at}?",
-                (
-                    Choice("Recover", partial(self._recover, found)),
-                    Choice("Discard", found.remove),
-                    Choice("Later", lambda: None),
-                ),
-            )
-            return
-
-    def _recover(self, found: recovery.LeftBehind) -> None:
-        self.editor.start_over(self.recovery.recover(found))
 
 
 def main(file: Path | None, device: str | None) -> int:
