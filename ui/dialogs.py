@@ -77,13 +77,15 @@ class TextField:
     def __init__(self, title: str, label: str, text: str, then: Callable[[str], object]) -> None:
         self.title, self.label, self.text, self.then = title, label, text, then
         self._refusals = widgets.Refusals()
+        self._is_asked_again = False
 
     def draw(self, editor: Editor) -> None:
         """See Dialog."""
         if not _begin(self.title):
             return
-        if imgui.is_window_appearing():
+        if imgui.is_window_appearing() or self._is_asked_again:
             imgui.set_keyboard_focus_here()
+        self._is_asked_again = False
         with widgets.row(self.label) as field:
             _, self.text = imgui.input_text(field, self.text, imgui.InputTextFlags_.auto_select_all)
             places.note(self.label)
@@ -94,7 +96,8 @@ class TextField:
             close(editor, self)
         elif chosen == 0:
             self._refusals = widgets.Refusals()
-            if self._refusals.accepted(False, lambda: self.then(self.text) is None):
+            self._is_asked_again = not self._refusals.accepted(False, lambda: self.then(self.text) is None)
+            if not self._is_asked_again:
                 close(editor, self)
 
 
@@ -113,6 +116,7 @@ class PathDialog:
     ) -> None:
         self.title, self.kind, self.is_saving, self.then = title, kind, is_saving, then
         self.text = f"{folder}/{name}".replace("//", "/")
+        self._is_asked_again = False
         self._native = _native_dialog(title, kind, is_saving, folder) if _has_native_dialogs() else None
 
     def draw(self, editor: Editor) -> None:
@@ -129,8 +133,9 @@ class PathDialog:
     def _draw_field(self, editor: Editor) -> None:
         if not _begin(self.title):
             return
-        if imgui.is_window_appearing():
+        if imgui.is_window_appearing() or self._is_asked_again:
             imgui.set_keyboard_focus_here()
+        self._is_asked_again = False
         imgui.set_next_item_width(-1)
         _, self.text = imgui.input_text("##path", self.text)
         places.note("Path")
@@ -146,7 +151,10 @@ class PathDialog:
     def _use(self, editor: Editor, action: Callable[[], object]) -> None:
         # A path that is refused is asked for again; the message says why.
         if not editor.attempt(action) and editor.dialog is None:
-            editor.dialog = self
+            self._ask_again(editor)
+
+    def _ask_again(self, editor: Editor) -> None:
+        editor.dialog, self._is_asked_again = self, True
 
     def _take(self, editor: Editor) -> None:
         path = absolute_path(self.text)
@@ -158,13 +166,11 @@ class PathDialog:
         if not (self.is_saving and os.path.exists(path)):
             self.then(path)
             return
-
-        def ask_again() -> None:
-            editor.dialog = self
-
         replace = Choice("Replace", lambda: self._use(editor, lambda: self.then(path)))
         editor.dialog = Question(
-            "Replace file", f"{path.name} is there already.", (replace, Choice("Cancel", ask_again))
+            "Replace file",
+            f"{path.name} is there already.",
+            (replace, Choice("Cancel", lambda: self._ask_again(editor))),
         )
 
     def _draw_folder(self) -> None:
