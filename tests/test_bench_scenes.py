@@ -115,6 +115,7 @@ def test_peers_are_checked_then_timed(
     factors = {"incpt": 1.0, "cycles": 1.0, "mitsuba scalar_rgb": 1.05, "mitsuba llvm_ad_rgb": None}
     store, made = peers_found(monkeypatch, device, tmp_path, factors)
     errors = capsys.readouterr().err
+    assert errors.count("skipped: mitsuba llvm_ad_rgb") == 1
     assert "skipped: mitsuba llvm_ad_rgb: not installed; run pip install it" in errors
     assert "mitsuba scalar_rgb on cornell: not timed, its mean radiance is off by " in errors
     results = store.read()

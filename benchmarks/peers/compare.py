@@ -73,13 +73,13 @@ class Pool:
         self._threads, self._device = threads, device
         self._workers: dict[str, Worker] = {}
         self._loaded: dict[str, str] = {}
-        self._missing: dict[str, str] = {}
+        self.missing: dict[str, str] = {}
         self.samples: dict[tuple[str, str], int] = {}
 
     def worker(self, peer: str, scene: str, job: Job) -> Worker:
         """With the scene loaded. Raises MissingPeer."""
-        if peer in self._missing:
-            raise MissingPeer(self._missing[peer])
+        if peer in self.missing:
+            raise MissingPeer(self.missing[peer])
         try:
             if peer not in self._workers:
                 self._workers[peer] = Worker(peer, self._threads, self._device)
@@ -87,8 +87,8 @@ class Pool:
                 self._workers[peer].load(job)
                 self._loaded[peer] = scene
         except MissingPeer as missing:
-            self._missing[peer] = f"{peer}: {missing}"
-            raise MissingPeer(self._missing[peer]) from None
+            self.missing[peer] = f"{peer}: {missing}"
+            raise MissingPeer(self.missing[peer]) from None
         return self._workers[peer]
 
     def close(self) -> None:
@@ -220,6 +220,8 @@ class _SceneBench:
         return self._pool.samples[key]
 
     def _disagreement(self, peer: str) -> str | None:
+        if peer in self._pool.missing:
+            return self._pool.missing[peer]
         wanted = self.check(peer).subject
         for record in reversed(self._store.read().where(**wanted)):
             if record.values["agrees"]:
