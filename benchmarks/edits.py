@@ -121,9 +121,11 @@ class EditBench:
         other_seed = replace(settings, seed=(settings.seed + 1) % (1 << 32))
         return self.gallery.converged(scene, other_seed, self.reference_spp, note)
 
-    def run(self, edit: Edit, settings: RenderSettings, marks: Marks, note: Note) -> Timeline:
-        """Make the edit and go on until the last mark; `note` hears of the preparation (0 to 1/2), and of
-        the steps."""
+    def run(
+        self, edit: Edit, settings: RenderSettings, marks: Marks, note: Note, ready: Callable[[], None]
+    ) -> Timeline:
+        """Make the edit and go on until the last mark. `note` hears of the preparation (0 to 1/2) and of the
+        steps; `ready` is called in between."""
         after = edit.apply(self.scene)
         start = self.start(settings, lambda f: note(0.2 * f))
         reference = self.reference(after, settings, lambda f: note(0.2 + 0.3 * f))
@@ -135,6 +137,7 @@ class EditBench:
             session.step()
             self._warm.add(variant)
             session = self._at(start)
+        ready()
         return _timed(session, edit, after, reference, marks, note)
 
     def _at(self, start: Snapshot) -> Session:

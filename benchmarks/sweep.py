@@ -99,12 +99,7 @@ def _task(bench: EditBench, case: Case, grid: Grid, repetition: int) -> Task:
     subject = edit_subject(bench, case.edit, settings, marks, repetition)
 
     def measure(work: Work) -> Outcome:
-        def note(fraction: float) -> None:
-            work.check(fraction)
-            if fraction == 0.5:
-                work.timing_starts()
-
-        line: Timeline = bench.run(case.edit, settings, marks, note)
+        line: Timeline = bench.run(case.edit, settings, marks, work.check, work.timing_starts)
         return Outcome(line.values(), [capture.as_row() for capture in line.captures])
 
     weight = max((*marks.steps, 1)) + 4 * max((*marks.seconds, 0.0))
@@ -115,17 +110,29 @@ def table(results: Results) -> Table:
     """Medians over the repetitions; below steps and seconds the normalized RMSE."""
     shown = Table(title="sweep: medians", title_justify="left", box=None, pad_edge=False)
     marks = sorted({row["mark"] for r in results.records for row in r.rows}, key=_mark_order)
-    for name in ("edit", "strategy", "NoR", "tile", "bounces", "first tile ms", "step ms", "queue s", *marks):
+    for name in (
+        "edit",
+        "strategy",
+        "NoR",
+        "tile",
+        "bounces",
+        "Mpaths/s",
+        "first tile ms",
+        "step ms",
+        "queue s",
+        *marks,
+    ):
         shown.add_column(name, justify="left" if name in ("edit", "strategy") else "right", no_wrap=True)
     names = ("edit", "strategy", "nor", "tile_size", "max_bounces")
     timings = [
         grouped(results, lambda r, v=value: r.values.get(v), *names)  # type: ignore[misc]
-        for value in ("first_tile_ms", "step_ms", "queue_s")
+        for value in ("paths_per_second", "first_tile_ms", "step_ms", "queue_s")
     ]
     at_marks = [grouped(results, lambda r, m=mark: error_at(r.rows, m), *names) for mark in marks]  # type: ignore[misc]
-    for case in timings[1]:
+    for case in timings[0]:
         cells = ["" if name is None else str(name) for name in case]
-        cells += [_median(timing.get(case)) for timing in timings]
+        cells.append(summary([rate / 1e6 for rate in timings[0][case]]).text())
+        cells += [_median(timing.get(case)) for timing in timings[1:]]
         shown.add_row(*cells, *(_error(errors.get(case)) for errors in at_marks))
     return shown
 

@@ -107,7 +107,7 @@ def _task(
     subject = edit_subject(bench, edit, chosen, marks, 0)
 
     def measure(work: Work) -> Outcome:
-        line = bench.run(edit, chosen, marks, work.check)
+        line = bench.run(edit, chosen, marks, work.check, work.timing_starts)
         pictures.write(digest(subject), line)
         return Outcome(line.values(), [capture.as_row() for capture in line.captures])
 

@@ -35,9 +35,13 @@ def nothing(fraction: float) -> None:
     assert 0 <= fraction <= 1
 
 
+def ready() -> None:
+    pass
+
+
 def test_marks_and_timeline(bench: EditBench) -> None:
     settings = small_settings(strategy="spiral", nor=16)
-    line = bench.run(EDIT, settings, Marks((0, 1, 3), (1e-6, 30 * 1e-3), done=True), nothing)
+    line = bench.run(EDIT, settings, Marks((0, 1, 3), (1e-6, 30 * 1e-3), done=True), nothing, ready)
     captures = {capture.mark: capture for capture in line.captures}
     assert set(captures) == {"0 steps", "1 steps", "3 steps", "1e-06 s", "0.03 s", "done"}
     # 6 x 4 tiles, 24 slots a step, 16 repetitions: the queue takes 16 steps.
@@ -56,7 +60,7 @@ def test_marks_and_timeline(bench: EditBench) -> None:
 
 def test_captured_errors_are_those_of_a_session(bench: EditBench) -> None:
     settings = small_settings(strategy="spiral", nor=16)
-    line = bench.run(EDIT, settings, Marks((0, 2)), nothing)
+    line = bench.run(EDIT, settings, Marks((0, 2)), nothing, ready)
     after = EDIT.apply(bench.scene)
     session = Session(bench.scene, settings=settings, device=bench.device)
     session.render(32)
@@ -71,8 +75,16 @@ def test_captured_errors_are_those_of_a_session(bench: EditBench) -> None:
     assert line.captures[0].errors["normalized_rmse"] > expected
 
 
+def test_others_are_watched_from_after_the_preparation(bench: EditBench) -> None:
+    heard: list[float] = []
+    bench.run(EDIT, small_settings(), Marks(done=True), heard.append, lambda: heard.append(-1))
+    assert heard.count(-1) == 1
+    before, after = heard[: heard.index(-1)], heard[heard.index(-1) + 1 :]
+    assert max(before) <= 0.5 <= min(after) and len(after) == 16
+
+
 def test_restart_is_done_after_one_picture(bench: EditBench) -> None:
-    line = bench.run(EDIT, small_settings(strategy="restart"), Marks(done=True), nothing)
+    line = bench.run(EDIT, small_settings(strategy="restart"), Marks(done=True), nothing, ready)
     assert line.done_step == 1
     assert [capture.mark for capture in line.captures] == ["done"]
 
