@@ -21,7 +21,7 @@ from incpt.ui.document import Document
 from incpt.ui.messages import Messages
 from incpt.ui.overlays import NEEDS_AOVS
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
-from incpt.ui.renderer import Building, Exported, Picked, Problem, Renderer, Restart
+from incpt.ui.renderer import Building, Exported, Message, Picked, Problem, Renderer, Restart
 from incpt.ui.selection import Selection
 
 if TYPE_CHECKING:
@@ -210,8 +210,8 @@ class Editor:
 
     # ----------------------------------------------------------------------------------- one frame
 
-    def receive(self) -> bool:
-        """Take the renderer's messages; returns whether there was one."""
+    def receive(self) -> list[Message]:
+        """Take the renderer's messages, and return them."""
         messages = self.renderer.poll()
         for message in messages:
             match message:
@@ -226,7 +226,7 @@ class Editor:
                 case Problem():
                     self.device_failed |= message.fatal
                     self.messages.add(message.text, "error")
-        return bool(messages)
+        return messages
 
     def settle(self, is_held: bool) -> None:
         """End a frame; `is_held` tells whether a widget, the gizmo or the camera is being dragged."""

@@ -6,6 +6,8 @@ stands before the first kernel is compiled. PyOpenCL lets other threads run whil
 
 from __future__ import annotations
 
+import os
+import sys
 import threading
 import time
 from collections import deque
@@ -17,6 +19,8 @@ from typing import Protocol
 from incpt.device import Device
 from incpt.errors import DeviceError, InputError, OutputError, one_line
 from incpt.live import Frame, Live, RenderingStoppedError, View
+
+_NICER = 5
 
 FIGURES_SECONDS = 0.1
 """Between two Frames with the same picture; a window redraws for each."""
@@ -235,6 +239,7 @@ class ThreadedRenderer:
             raise _ClosedError
 
     def _loop(self) -> None:
+        _give_way()
         device = self._device if isinstance(self._device, Device) else Device(self._device)
         self._wait_for_news(None)
         if self._view is None:
@@ -273,6 +278,14 @@ class ThreadedRenderer:
 
 class _ClosedError(Exception):
     """The window closed while kernels were being built."""
+
+
+def _give_way() -> None:
+    """Let the window go first where rendering and drawing share the processor: on Linux a thread has a
+    priority of its own, which the threads of a device on the CPU inherit."""
+    if sys.platform == "linux":
+        thread = threading.get_native_id()
+        os.setpriority(os.PRIO_PROCESS, thread, os.getpriority(os.PRIO_PROCESS, thread) + _NICER)
 
 
 def _explain(error: Exception) -> str:

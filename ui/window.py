@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import math
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,7 +19,9 @@ from incpt.ui import theme
 
 _GLSL = "#version 330"
 _SETTLING_FRAMES = 3
-"""Frames that imgui needs after an event until hover, layout and tooltips are at rest."""
+"""Frames that imgui needs after an event until hover and layout are at rest."""
+_TOOLTIP_SECONDS = 0.5
+"""After the last event comes a frame for tooltips, which wait until the mouse rests."""
 
 
 class Window:
@@ -44,6 +48,7 @@ class Window:
         self.wants_to_close = False
         self._title = title
         self._frames_due = _SETTLING_FRAMES
+        self._tooltip_at = math.inf
         self._fixed_scale = scale
         self._listen()
         self._start_imgui(layout_file)
@@ -61,7 +66,7 @@ class Window:
             glfw.set_framebuffer_size_callback,
             glfw.set_window_refresh_callback,
         ):
-            listen(self.handle, lambda *_: self.redraw())
+            listen(self.handle, lambda *_: self._touched())
         glfw.set_drop_callback(self.handle, self._drop)
         glfw.set_window_close_callback(self.handle, self._close_asked)
 
@@ -100,12 +105,20 @@ class Window:
         """Draw the next few frames, whatever happens."""
         self._frames_due = _SETTLING_FRAMES
 
+    def _touched(self) -> None:
+        self.redraw()
+        self._tooltip_at = time.monotonic() + _TOOLTIP_SECONDS
+
     def wait(self, timeout_seconds: float) -> bool:
         """Take events, at most waiting that long for the first one; returns whether a frame is due."""
         if self._frames_due > 0:
             glfw.poll_events()
         else:
-            glfw.wait_events_timeout(timeout_seconds)
+            left = self._tooltip_at - time.monotonic()
+            glfw.wait_events_timeout(min(timeout_seconds, max(left, 0.001)))
+            if time.monotonic() >= self._tooltip_at:
+                self._tooltip_at = math.inf
+                self.redraw()
         due = self._frames_due > 0
         self._frames_due = max(self._frames_due - 1, 0)
         return due
