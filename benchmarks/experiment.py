@@ -14,7 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 
 from incpt.benchmarks.store import Results, Row, Store
 from incpt.benchmarks.timing import LoadMeter
-from incpt.console import Interruption, interruption
+from incpt.console import Interruption, Stopped, interruption
 
 
 @dataclass(frozen=True)
@@ -63,10 +63,6 @@ class Work:
     def load(self) -> Row:
         """The load since timing started."""
         return self._meter.read().as_row()
-
-
-class Stopped(Exception):  # noqa: N818 - it is no error
-    """Ctrl-C ended an experiment; the message says what is kept."""
 
 
 def run(store: Store, tasks: Sequence[Task], environment: Mapping[str, Any]) -> Results:

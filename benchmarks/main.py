@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 
 import typer
 
 from incpt.benchmarks import build, rays, report, scale, sweep, table51
-from incpt.benchmarks.experiment import Stopped
 from incpt.benchmarks.peers import compare
 from incpt.errors import InputError
-
-INTERRUPTED = 130
 
 app = typer.Typer(
     name="incpt bench",
@@ -39,12 +35,9 @@ def _bench(context: typer.Context) -> None:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run a benchmark and return the exit status; raises what `incpt.cli` explains: InputError and others."""
+    """Run a benchmark and return the exit status; raises what `incpt.cli` explains: InputError, Stopped and others."""
     try:
         result = app(list(arguments), prog_name="incpt bench", standalone_mode=False)
-    except Stopped as stopped:
-        print(f"incpt: {stopped}", file=sys.stderr)
-        return INTERRUPTED
     except Exception as error:
         if hasattr(error, "format_message"):  # a usage error, as typer or its click raise it
             message = str(error.format_message()).rstrip(".")

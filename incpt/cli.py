@@ -27,7 +27,7 @@ from rich.table import Table
 
 from incpt import device as opencl
 from incpt import scene_io
-from incpt.console import interruption, path_progress
+from incpt.console import Stopped, interruption, path_progress
 from incpt.edit_script import load_edits
 from incpt.errors import DeviceError, InputError, InputWarning, OutputError, one_line
 from incpt.export import SUFFIXES, write_picture
@@ -75,16 +75,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return result if isinstance(result, int) else 0
     except (KeyboardInterrupt, typer.Abort):
         return _complain("stopped", INTERRUPTED)
-    except _StoppedError as error:
+    except Stopped as error:
         return _complain(str(error), INTERRUPTED)
     except Exception as error:
         if debug:
             traceback.print_exc()
         return _complain(*_explain(error))
-
-
-class _StoppedError(Exception):
-    """A command was interrupted and kept what it had; the message says what."""
 
 
 def _explain(error: Exception) -> tuple[str, int]:
@@ -217,7 +213,7 @@ def render(
         _complain(f"warning: {nonfinite:,} samples were not finite and count as black", 0)
     print(f"{output}: {session.size[0]} x {session.size[1]}, {samples} samples per pixel")
     if stop.requested:
-        raise _StoppedError(f"stopped at {samples} of {spp} samples per pixel")
+        raise Stopped(f"stopped at {samples} of {spp} samples per pixel")
 
 
 @app.command()
@@ -270,7 +266,7 @@ def replay(
         _print_table(report.table())
     print(f"{output}: pictures, {report.sheet_path.name}, {report.csv_path.name}")
     if stop.requested:
-        raise _StoppedError(f"stopped; {output} holds what was done")
+        raise Stopped(f"stopped; {output} holds what was done")
 
 
 @app.command()

@@ -14,6 +14,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 
+class Stopped(Exception):  # noqa: N818 - what the user asked for is no error
+    """A command was interrupted and kept what it had; the message says what."""
+
+
 class Interruption:
     """Whether Ctrl-C was pressed. `check` is for places where work can stop without loss."""
 

@@ -18,6 +18,7 @@ from incpt.benchmarks import experiment, store
 from incpt.benchmarks.content import code_digest, digest
 from incpt.benchmarks.experiment import Outcome, Task, Work, time_left
 from incpt.benchmarks.store import Results, Store
+from incpt.console import Stopped
 from incpt.errors import InputWarning, OutputError
 
 ENVIRONMENT = {"id": "e1", "machine": "a machine", "cores": 2, "device": "a device", "commit": "c0ffee"}
@@ -149,7 +150,7 @@ def test_interruption_keeps_what_is_done_and_goes_on(tmp_path: Path) -> None:
         raise AssertionError("work goes on after Ctrl-C")
 
     first = [counting_task("a", calls), Task("b", {"case": "b", "repetition": 0}, interrupted)]
-    with pytest.raises(experiment.Stopped, match=r"1 of 2 measurements .* the same command goes on"):
+    with pytest.raises(Stopped, match=r"1 of 2 measurements .* the same command goes on"):
         experiment.run(Store(tmp_path, "demo"), first, ENVIRONMENT)
     assert (tmp_path / "demo.csv").read_text().count("\n") == 2
     both = [counting_task("a", calls), counting_task("b", calls)]
