@@ -35,7 +35,7 @@ def _bench(context: typer.Context) -> None:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run a benchmark and return the exit status; raises what `incpt.cli` explains: InputError, Stopped and others."""
+    """Run a benchmark and return the exit status. Raises what `incpt.cli` explains: InputError, Stopped ..."""
     try:
         result = app(list(arguments), prog_name="incpt bench", standalone_mode=False)
     except Exception as error:

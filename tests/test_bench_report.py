@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -190,6 +191,40 @@ def test_report_of_partial_results(tmp_path: Path) -> None:
     # Once: errors do not depend on it.
     assert text.count("BUSY MACHINE: during 1 of 1 measurements other processes had up to 1.5 cores") == 1
     assert "0.10000 (0.11519)" in text
+
+
+def test_report_of_every_experiment(tmp_path: Path) -> None:
+    """A page with a plot of each kind, from the fewest results that have one."""
+    environment = {"id": "e", "machine": "m", "cores": 2}
+
+    def add(name: str, subject: dict[str, Any], values: dict[str, Any], rows: Any = ()) -> None:
+        Store(tmp_path, name).add({"repetition": 0, **subject}, environment, {"busy": False}, values, rows)
+
+    marks = [
+        {"mark": mark, "steps": 1, "normalized_rmse": 0.1, "relative_mse": 0.2, "flip": 0.1}
+        for mark in ("1 steps", "5 steps", "0.1 s", "1 s", "done")
+    ]
+    times = {"paths_per_second": 1e6, "first_tile_ms": 3.0, "step_ms": 2.0, "queue_s": None}
+    place = {"scene": "s", "edit": "turn & move", "tile_size": 16, "max_bounces": 2}
+    add("sweep", {**place, "strategy": "spiral", "nor": 16}, times, marks)
+    add("sweep", {**place, "strategy": "restart", "nor": None}, {**times, "queue_s": 1.5}, marks)
+    for tracer in rays.TRACERS:
+        subject = {"scene": "s", "rays": "shadow", "tracer": tracer, "measure": "rate"}
+        add("rays", subject, {"rays_per_second": 5e6})
+    for peer in ("incpt", "cycles"):
+        rate = {"paths_per_second": 2e6, "error_seconds": 0.01}
+        add("peers", {"measure": "rate", "scene": "s", "peer": peer}, rate)
+        add("peers", {"measure": "move", "scene": "s", "peer": peer}, {"ms": 12.0})
+    for count in (10, 100):
+        add("build", {"measure": "top", "objects": count}, {"ms": count**0.5, "count": count})
+        add("scale", {"axis": "lights", "value": count}, {"step_ms": count**0.5})
+    text = report.page(tmp_path)
+    page = parsed(text)
+    assert page.headings == [name for name in EXPERIMENTS if name != "table51"]
+    # Errors by steps and by seconds; rays; rate, error and latency of renderers; trees; lamps.
+    assert text.count("<svg") == 2 + 1 + 3 + 1 + 1
+    assert "turn &amp; move" in text and "<b>turn & move" not in text
+    assert text.count("n^0.50") >= 2
 
 
 def test_report_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from incpt.scenes import make_city
 
 from incpt.device import Device
 from incpt.edit_script import load_edits
 from incpt.image_io import tone_map
 from incpt.scene import Scene, diff
 from incpt.scene_io import load
+from incpt.scenes import make_city
 from incpt.session import Session
 
 FOLDER = Path(str(resources.files("incpt.scenes")))
