@@ -140,16 +140,25 @@ class Hand:
         between: Callable[[], object] | None = None,
     ) -> None:
         """Press, move in steps, release; `between` is called after each step, while the button is down."""
-        self.move(start)
+        with self.pressed(start, button):
+            for i in range(1, steps + 1):
+                share = i / steps
+                self.move((start[0] + (end[0] - start[0]) * share, start[1] + (end[1] - start[1]) * share))
+                if between is not None:
+                    between()
+        self.pump(frames=2)
+
+    @contextmanager
+    def pressed(self, at: tuple[float, float], button: int = 1) -> Iterator[None]:
+        """While a mouse button is held down that was pressed at that place."""
+        self.move(at)
         _xdotool("mousedown", str(button))
         self.pump(frames=2)
-        for i in range(1, steps + 1):
-            share = i / steps
-            self.move((start[0] + (end[0] - start[0]) * share, start[1] + (end[1] - start[1]) * share))
-            if between is not None:
-                between()
-        _xdotool("mouseup", str(button))
-        self.pump(frames=4)
+        try:
+            yield
+        finally:
+            _xdotool("mouseup", str(button))
+            self.pump(frames=2)
 
     def key(self, keys: str) -> None:
         """A tap on a key such as "ctrl+z"; keys are named as X names them."""
