@@ -9,23 +9,46 @@ from rich.table import Table
 
 from incpt.benchmarks import build, rays, scale, sweep, table51
 from incpt.benchmarks.peers import compare
-from incpt.benchmarks.store import Results
+from incpt.benchmarks.store import Results, Row
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """Its title, the tables that show its results, and whether these hold times."""
+    """Its title, the tables that show its results, what must be the same for all results in one table
+    (names in their subjects), and whether the results are times."""
 
     title: str
     tables: Callable[[Results], Sequence[Table]]
+    setup: tuple[str, ...] = ()
     timed: bool = True
 
 
 EXPERIMENTS = {
-    table51.NAME: Experiment("The thesis's table 5.1 and figures 5.1 to 5.6", table51.tables, timed=False),
-    sweep.NAME: Experiment("Tile size, NoR, strategy, bounces", lambda results: [sweep.table(results)]),
-    compare.NAME: Experiment("Beside other renderers", compare.tables),
-    rays.NAME: Experiment("Traversal beside Embree", lambda results: [rays.table(results)]),
+    table51.NAME: Experiment(
+        "The thesis's table 5.1 and figures 5.1 to 5.6",
+        table51.tables,
+        ("scene", "size", "base_spp", "reference_spp"),
+        timed=False,
+    ),
+    sweep.NAME: Experiment(
+        "Tile size, NoR, strategy, bounces",
+        lambda results: [sweep.table(results)],
+        ("scene", "size", "base_spp", "reference_spp"),
+    ),
+    compare.NAME: Experiment("Beside other renderers", compare.tables, ("size", "threads", "reference_spp")),
+    rays.NAME: Experiment("Traversal beside Embree", lambda results: [rays.table(results)], ("size",)),
     build.NAME: Experiment("Trees: build, refit, top level", lambda results: [build.table(results)]),
-    scale.NAME: Experiment("How cost grows", lambda results: [scale.table(results)]),
+    scale.NAME: Experiment(
+        "How cost grows", lambda results: [scale.table(results)], ("size", "max_bounces", "least_s")
+    ),
 }
+
+
+def setup_text(apart: Row) -> str:
+    """What sets results apart, such as "size 512 x 512, threads 2"; machine and device are told elsewhere."""
+    words = []
+    for name, value in apart.items():
+        if name not in ("machine", "device", "scene") and value is not None:
+            shown = " x ".join(map(str, value)) if isinstance(value, list) else str(value)
+            words.append(f"{name.replace('_', ' ')} {shown}")
+    return ", ".join(words)

@@ -21,7 +21,7 @@ from rich.table import Table
 
 from incpt import files
 from incpt.benchmarks import store, tables
-from incpt.benchmarks.catalogue import EXPERIMENTS
+from incpt.benchmarks.catalogue import EXPERIMENTS, setup_text
 from incpt.errors import InputError, in_place
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -45,17 +45,20 @@ def quote(results: Path, name: str, number: str | None) -> str:
     experiment = EXPERIMENTS.get(path.stem)
     if experiment is None:
         raise InputError(f"{path.stem}: no such experiment; there are {', '.join(EXPERIMENTS)}")
-    found = store.read(path).latest()
+    found = store.read(path)
     if not found.records:
         raise InputError(f"{path}: no results; record a run there, or remove the quote")
-    made = list(experiment.tables(found))
-    if number is not None:
-        if not 1 <= int(number) <= len(made):
-            raise InputError(f"{path.stem} {number}: it has {len(made)} tables")
-        made = [made[int(number) - 1]]
-    commands = dict.fromkeys(record.command for record in found.records if record.command)
-    sources = [*tables.notes(found, experiment.timed), *(f"`{command}`" for command in commands)]
-    blocks = [markdown(table) for table in made] + ["<br>\n".join(f"<sub>{s}</sub>" for s in sources)]
+    blocks = []
+    for apart, part in found.parts(*experiment.setup):
+        made = list(experiment.tables(part))
+        if number is not None:
+            if not 1 <= int(number) <= len(made):
+                raise InputError(f"{path.stem} {number}: it has {len(made)} tables")
+            made = [made[int(number) - 1]]
+        commands = dict.fromkeys(record.command for record in part.records if record.command)
+        sources = [setup_text(apart), *tables.notes(part, experiment.timed), *(f"`{c}`" for c in commands)]
+        blocks += [markdown(table) for table in made]
+        blocks.append("<br>\n".join(f"<sub>{source}</sub>" for source in sources if source))
     return "\n" + "\n\n".join(blocks) + "\n\n"
 
 

@@ -16,7 +16,7 @@ from rich.table import Table
 
 from incpt import files
 from incpt.benchmarks import build, options, plots, rays, scale, store, sweep, table51, tables
-from incpt.benchmarks.catalogue import EXPERIMENTS
+from incpt.benchmarks.catalogue import EXPERIMENTS, setup_text
 from incpt.benchmarks.fit import fitted
 from incpt.benchmarks.peers import compare
 from incpt.benchmarks.store import Results, grouped
@@ -36,7 +36,7 @@ code { font-size: 12px; overflow-wrap: anywhere } .small { color: #555; font-siz
 
 def page(folder: Path) -> str:
     """The whole page. Raises InputError where there are no results."""
-    found = {name: store.read(folder / f"{name}.jsonl").latest() for name in EXPERIMENTS}
+    found = {name: store.read(folder / f"{name}.jsonl") for name in EXPERIMENTS}
     there = {name: results for name, results in found.items() if results.records}
     if not there:
         raise InputError(f"{folder}: no results; measure first, for example with incpt bench sweep")
@@ -44,9 +44,13 @@ def page(folder: Path) -> str:
     for name, results in there.items():
         experiment = EXPERIMENTS[name]
         parts.append(f'<h2 id="{name}">{escape(experiment.title)}</h2>')
-        parts += _context(results, experiment.timed)
-        parts += _PLOTS[name](results, folder)
-        parts += (html_table(table) for table in experiment.tables(results))
+        for apart, part in results.parts(*experiment.setup):
+            parts.append(f"<h3>{escape(setup_text(apart))}</h3>")
+            parts += _context(part, experiment.timed)
+            parts += _PLOTS[name](part)
+            parts += (html_table(table) for table in experiment.tables(part))
+        if name == table51.NAME:
+            parts += _figures(folder)
     body = "\n".join(parts)
     head = f'<meta charset="utf-8"><title>incpt: benchmarks</title><style>{_STYLE}</style>'
     return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head>\n<body>\n{body}\n</body></html>\n'
@@ -80,7 +84,7 @@ def _figure(drawn: str) -> str:
 # --------------------------------------------------------------------------------- plots and pictures
 
 
-def _sweep(results: Results, folder: Path) -> Iterable[str]:
+def _sweep(results: Results) -> Iterable[str]:
     names = ("scene", "edit", "tile_size", "max_bounces")
     for key in dict.fromkeys(tuple(r.subject[name] for name in names) for r in results.records):
         chosen = results.where(**dict(zip(names, key, strict=True)))
@@ -110,7 +114,7 @@ def _sweep_plots(results: Results, key: tuple[Any, ...]) -> Iterable[str]:
             yield plots.lines(curves, x_label, "normalized RMSE", title)
 
 
-def _table51(results: Results, folder: Path) -> Iterable[str]:
+def _table51(results: Results) -> Iterable[str]:
     curves = {}
     for variant in table51.VARIANTS:
         record = table51.record_of(results, table51.TABLE_EDIT, variant)
@@ -120,12 +124,15 @@ def _table51(results: Results, folder: Path) -> Iterable[str]:
     for i, label in enumerate(("standard", "NoR 64", "NoR 128", "NoR 256")):
         curves[f"thesis: {label}"] = [(float(n), row[i]) for n, row in table51.THESIS.items()]
     yield _figure(plots.lines(curves, "steps after the edit", "normalized RMSE", table51.TABLE_EDIT))
+
+
+def _figures(folder: Path) -> Iterable[str]:
     for picture in sorted(folder.glob("figures-*.png")):
         encoded = base64.b64encode(picture.read_bytes()).decode()
         yield f'<figure><img alt="{escape(picture.stem)}" src="data:image/png;base64,{encoded}"></figure>'
 
 
-def _rays(results: Results, folder: Path) -> Iterable[str]:
+def _rays(results: Results) -> Iterable[str]:
     rates = grouped(results, lambda r: r.values.get("rays_per_second"), "scene", "rays", "tracer")
     for scene in dict.fromkeys(scene for scene, _, _ in rates):
         groups: dict[str, dict[str, Summary]] = {}
@@ -135,7 +142,7 @@ def _rays(results: Results, folder: Path) -> Iterable[str]:
         yield _figure(plots.bars(groups, "million rays per second", str(scene)))
 
 
-def _peers(results: Results, folder: Path) -> Iterable[str]:
+def _peers(results: Results) -> Iterable[str]:
     drawn = (
         (compare.RATE, "paths_per_second", 1e-6, "million camera paths per second", False),
         (compare.RATE, "error_seconds", 1.0, "relMSE x seconds", True),
@@ -149,7 +156,7 @@ def _peers(results: Results, folder: Path) -> Iterable[str]:
             yield _figure(plots.bars(groups, label, label, logarithmic))
 
 
-def _build(results: Results, folder: Path) -> Iterable[str]:
+def _build(results: Results) -> Iterable[str]:
     for what in ("triangles", "objects"):
         curves = {name: points for name in build.WHAT if (points := build.points(results, name, what))}
         laws = {
@@ -161,7 +168,7 @@ def _build(results: Results, folder: Path) -> Iterable[str]:
             yield _figure(plots.lines(curves, what, "ms", f"trees against {what}", laws))
 
 
-def _scale(results: Results, folder: Path) -> Iterable[str]:
+def _scale(results: Results) -> Iterable[str]:
     for axis in scale.AXES:
         points, law = scale.growth(results, axis.name)
         if points:
@@ -170,7 +177,7 @@ def _scale(results: Results, folder: Path) -> Iterable[str]:
             yield _figure(plots.lines({axis.name: points}, axis.what, label, axis.name, laws))
 
 
-_PLOTS: dict[str, Callable[[Results, Path], Iterable[str]]] = {
+_PLOTS: dict[str, Callable[[Results], Iterable[str]]] = {
     table51.NAME: _table51,
     sweep.NAME: _sweep,
     compare.NAME: _peers,

@@ -62,6 +62,19 @@ class Results:
         last = {digest(record.subject): record for record in self.records}
         return Results(self.environments, tuple(r for r in self.records if last[digest(r.subject)] is r))
 
+    def parts(self, *setup: str) -> list[tuple[Row, Results]]:
+        """The newest results of each machine, device and `setup` (names in the subject): what may stand in
+        one table. Each comes with what sets it apart."""
+        found: dict[str, tuple[Row, list[Record]]] = {}
+        for record in self.records:
+            environment = self.environments.get(record.environment, {})
+            place = {name: environment.get(name) for name in ("machine", "device")}
+            own = {name: record.subject.get(name) for name in setup}
+            found.setdefault(digest(place, own), ({**place, **own}, []))[1].append(record)
+        return [
+            (apart, Results(self.environments, tuple(records)).latest()) for apart, records in found.values()
+        ]
+
     def where(self, **subject: Any) -> list[Record]:
         """The records whose subject has these values."""
         return [r for r in self.records if all(r.subject.get(name) == v for name, v in subject.items())]

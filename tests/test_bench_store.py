@@ -116,6 +116,20 @@ def test_latest_replaces_what_was_measured_before(tmp_path: Path) -> None:
     assert [r.values["ms"] for r in there.read().latest().records] == [2.0, 9.0]
 
 
+def test_parts_keep_apart_what_cannot_be_compared(tmp_path: Path) -> None:
+    there = Store(tmp_path, "demo")
+    other = {**ENVIRONMENT, "id": "e2", "device": "another device"}
+    newer = {**ENVIRONMENT, "id": "e3", "commit": "later"}
+    there.add({"n": 1, "size": [8, 8]}, ENVIRONMENT, QUIET, {"ms": 1.0})
+    there.add({"n": 1, "size": [64, 64]}, ENVIRONMENT, QUIET, {"ms": 2.0})
+    there.add({"n": 2, "size": [8, 8]}, ENVIRONMENT, QUIET, {"ms": 3.0})
+    there.add({"n": 1, "size": [8, 8]}, other, QUIET, {"ms": 4.0})
+    there.add({"n": 2, "size": [8, 8]}, newer, QUIET, {"ms": 5.0})
+    parts = there.read().parts("size")
+    assert [[r.values["ms"] for r in part.records] for _, part in parts] == [[1.0, 5.0], [2.0], [4.0]]
+    assert parts[2][0] == {"machine": "a machine", "device": "another device", "size": [8, 8]}
+
+
 def test_folder_that_cannot_be_made(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="choose another --output"):
