@@ -252,6 +252,7 @@ class Live:
             aovs=self._aovs if self._view.aovs else None,
             nonfinite=sum(side.nonfinite for side in self._sides),
             resting=resting,
+            is_pinned=self._reference is not None or self._is_pinning,
         )
 
 

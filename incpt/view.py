@@ -83,6 +83,7 @@ class Frame:
     aovs         first-hit images of the view's size, or smaller while changes stream in.
     nonfinite    samples since the last change of the scene that were not finite and count as black.
     resting      paused, or the target is reached: nothing is under way.
+    is_pinned    there is a reference to compare with, or there will be once the picture is whole.
     """
 
     view: View
@@ -94,3 +95,4 @@ class Frame:
     aovs: Aovs | None
     nonfinite: int
     resting: bool
+    is_pinned: bool = False

@@ -168,6 +168,17 @@ def test_ctrl_picks_more_than_one(user: Desk) -> None:
     assert user.editor.selection.names == ()
 
 
+def test_a_click_beside_the_picture_deselects(user: Desk) -> None:
+    beside = (user.rect[0] + 20, user.rect[1] + 20)
+    assert beside[1] < user.picture[1]
+    user.editor.select(Selection(("lamp",)))
+    with user.held_keys("Ctrl"):
+        user.click_at(*beside)
+    assert user.editor.selection.names == ("lamp",)
+    user.click_at(*beside)
+    assert user.editor.selection.names == () and not user.null.requests and user.editor.point is None
+
+
 def test_a_pick_of_what_is_gone_selects_nothing(user: Desk) -> None:
     user.editor.select(Selection(("lamp",)))
     tell(user, Picked((0.5, 0.5), "gone", False))
@@ -260,6 +271,7 @@ def test_the_gizmo_moves_what_is_selected(user: Desk) -> None:
     ]
     np.testing.assert_allclose(by[0], by[1], atol=1e-6)
     assert by[0][0] > 0.01 and np.abs(by[0][1:]).max() < 1e-5
+    assert user.place("gizmo") == pytest.approx((x + 60, y), abs=1.0)  # it follows the mouse
     assert user.undo_count == 1 and user.editor.document.history.undo_label == "Move"
     user.key("Ctrl+Z")
     assert user.scene == SCENE
@@ -436,6 +448,7 @@ def test_pinning_and_exporting_ask_the_renderer(user: Desk, tmp_path: Path) -> N
     tell(user, frame_of(user.editor.view))
     user.panel("Method")
     user.click("Pin this picture")
+    tell(user, replace(frame_of(user.editor.view), is_pinned=True))
     user.click("Unpin")
     user.editor.change_display(DisplaySettings(exposure=2.0, curve="filmic"))
     path = tmp_path / "a.png"

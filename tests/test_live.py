@@ -324,11 +324,12 @@ def test_error_against_a_pinned_reference(make_live: MakeLive) -> None:
     frames_until_rest(live, view_of(scene, target_spp=4))
     live.pin_reference(True)
     frame = live.advance(view_of(scene, target_spp=4))
-    assert frame is not None and frame.pictures[0].error == 0
+    assert frame is not None and frame.pictures[0].error == 0 and frame.is_pinned
     pinned = frames_until_rest(live, view_of(turned(scene, 61), target_spp=4))[-1].pictures[0].error
     assert pinned is not None and 0.01 < pinned < 1
     smaller = view_of(turned(scene, 61), target_spp=4, resolution_scale=0.5)
-    assert frames_until_rest(live, smaller)[-1].pictures[0].error is None
+    last = frames_until_rest(live, smaller)[-1]
+    assert last.pictures[0].error is None and not last.is_pinned
     back = frames_until_rest(live, view_of(turned(scene, 61), target_spp=4))[-1]
     assert back.pictures[0].error is None
 

@@ -329,8 +329,7 @@ def restart(editor: Editor) -> None:
 
 def pin(editor: Editor) -> None:
     """Measure errors against the picture as it is now, or stop measuring."""
-    editor.is_pinned = not editor.is_pinned
-    editor.renderer.request(Pin(editor.is_pinned))
+    editor.renderer.request(Pin(not editor.is_pinned))
 
 
 def show_about(editor: Editor) -> None:

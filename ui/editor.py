@@ -217,6 +217,7 @@ class Editor:
             match message:
                 case Frame():
                     self.frame, self.building = message, None
+                    self.is_pinned = message.is_pinned
                 case Building():
                     self.building = message if message.done < message.total else None
                 case Picked():

@@ -333,7 +333,9 @@ def _is_inside(point: tuple[float, float], rect: Rect) -> bool:
 
 
 def _whole_size(rect: Rect) -> tuple[int, int] | None:
-    width, height = int(rect[2]), int(rect[3])
+    """Pixels in a rectangle; None where it is too small for a picture."""
+    pixels = imgui.get_io().display_framebuffer_scale
+    width, height = int(rect[2] * pixels.x), int(rect[3] * pixels.y)
     return (width, height) if width >= 16 and height >= 16 else None
 
 
