@@ -19,9 +19,13 @@ def begin_frame() -> None:
 
 
 def note(name: str) -> None:
-    """Remember the place of the widget drawn last."""
+    """Remember the place of the widget drawn last: the part of it that its panel does not cut off."""
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-    _drawing[name] = (low.x, low.y, high.x, high.y)
+    clip = imgui.internal.get_current_window_read().clip_rect
+    left, top = max(low.x, clip.min.x), max(low.y, clip.min.y)
+    right, bottom = min(high.x, clip.max.x), min(high.y, clip.max.y)
+    if left < right and top < bottom:
+        _drawing[name] = (left, top, right, bottom)
 
 
 def note_rect(name: str, rect: Rect) -> None:

@@ -18,6 +18,8 @@ from incpt.ui.panels.plots import Records
 from incpt.ui.widgets import Refusals
 
 _RIGHT_SHARE, _OUTLINER_SHARE = 0.25, 0.28
+_LEAST_WIDTH = 310.0
+"""Of the panels on the right, in points: all tabs are to be seen."""
 
 
 class Workspace:
@@ -202,7 +204,9 @@ def _lay_out(root: int) -> None:
     builder.dock_builder_remove_node(root)
     builder.dock_builder_add_node(root, builder.DockNodeFlagsPrivate_.dock_space)
     builder.dock_builder_set_node_size(root, imgui.get_main_viewport().work_size)
-    _, right, _ = builder.dock_builder_split_node_py(root, imgui.Dir.right, _RIGHT_SHARE)
+    least = _LEAST_WIDTH * imgui.get_style().font_scale_dpi / imgui.get_main_viewport().work_size.x
+    share = min(max(_RIGHT_SHARE, least), 0.5)
+    _, right, _ = builder.dock_builder_split_node_py(root, imgui.Dir.right, share)
     _, top, bottom = builder.dock_builder_split_node_py(right, imgui.Dir.up, _OUTLINER_SHARE)
     builder.dock_builder_dock_window("Outliner", top)
     for name in ("Object", "Scene", "Render", "Method"):
