@@ -56,7 +56,7 @@ def frame_of(view: View, mode: Mode = Mode.REFINE, spp: int = 4, error: float | 
 
 def tell(user: Desk, *messages: Message) -> None:
     user.null.messages += messages
-    user.frames(2)
+    user.frames(3)  # a window that appears has its size and place in its second frame
 
 
 # ---------------------------------------------------------------------------------------- what is shown

@@ -239,11 +239,11 @@ def test_what_is_no_number_changes_nothing(user: Desk, field: Field, typed: str)
 
 @pytest.mark.parametrize("typed", ["1e999", "-1e999", "-1e12", "1e12"])
 @pytest.mark.parametrize(
-    "field", [f for f in FIELDS if f.panel in ("Object", "Scene") and is_scene(f.place)], ids=str
+    "field",
+    [f for f in FIELDS if f.panel in ("Object", "Scene") and is_scene(f.place) and f.label != "Priority"],
+    ids=str,
 )
 def test_a_number_out_of_range_is_refused_with_a_remark(user: Desk, field: Field, typed: str) -> None:
-    if field.label == "Priority":
-        pytest.skip("a whole number is brought into its range")
     turn_to(user, field.panel, field.selected)
     before = state(user.editor)
     user.type(field.label, typed, across=field.across)
