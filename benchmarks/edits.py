@@ -30,11 +30,12 @@ Note = Callable[[float], None]
 @dataclass(frozen=True)
 class Marks:
     """When pictures are compared: so many steps, and so many seconds, after an edit; `done`: also when the
-    whole queue is."""
+    whole queue is. Without `flip` that measure is left out: it takes longer than a step."""
 
     steps: tuple[int, ...] = ()
     seconds: tuple[float, ...] = ()
     done: bool = False
+    flip: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,6 +202,7 @@ class _Watch:
         self._steps = sorted(set(marks.steps))
         self._seconds = sorted(set(marks.seconds))
         self._wants_done = marks.done
+        self._flip = marks.flip
         self._last: tuple[int, float, FloatImage] | None = None
         self._count = max(len(self._steps) + len(self._seconds) + marks.done, 1)
 
@@ -236,5 +238,5 @@ class _Watch:
 
     def _take(self, mark: str, steps: int, seconds: float, image: FloatImage) -> None:
         paths = sum(self._line.paths[:steps])
-        found = errors(image, self._reference)
+        found = errors(image, self._reference, self._flip)
         self._line.captures.append(Capture(mark, steps, seconds, paths, image, found))

@@ -91,12 +91,12 @@ def flip(image: npt.ArrayLike, reference: npt.ArrayLike) -> float | None:
     return float(mean)
 
 
-def errors(image: FloatImage, reference: FloatImage) -> dict[str, Any]:
-    """Columns of a result: normalized RMSE as in the thesis, relMSE of linear radiance, FLIP."""
+def errors(image: FloatImage, reference: FloatImage, with_flip: bool = True) -> dict[str, Any]:
+    """Columns of a result: normalized RMSE as in the thesis, relMSE of linear radiance, FLIP (else None)."""
     return {
         "normalized_rmse": normalized_rmse(image, reference),
         "relative_mse": relative_mse(image, reference),
-        "flip": flip(image, reference),
+        "flip": flip(image, reference) if with_flip else None,
     }
 
 

@@ -93,8 +93,10 @@ def tasks(bench: EditBench, script: EditScript, settings: RenderSettings, grid: 
 
 
 def _task(bench: EditBench, case: Case, grid: Grid, repetition: int) -> Task:
-    # Only once to the end of the queue: with NoR 512 that takes as long as 512 pictures.
-    marks = replace(grid.marks, done=grid.marks.done and repetition == 0)
+    # Only once to the end of the queue: with NoR 512 that takes as long as 512 pictures. The errors at steps
+    # are the same in every repetition.
+    first = repetition == 0
+    marks = replace(grid.marks, done=grid.marks.done and first, flip=first)
     settings = case.settings
     subject = edit_subject(bench, case.edit, settings, marks, repetition)
 

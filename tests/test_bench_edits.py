@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -173,6 +174,8 @@ def test_sweep_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture
             {"done"} if record.subject["repetition"] == 0 else set()
         )
         assert all(0 < row["normalized_rmse"] < 0.5 and row["relative_mse"] > 0 for row in record.rows)
+        if importlib.util.find_spec("flip_evaluator") is not None:
+            assert all((row["flip"] is None) == (record.subject["repetition"] > 0) for row in record.rows)
     environment = found.environments[found.records[0].environment]
     assert {"machine", "cores", "device", "driver", "versions", "code", "commit"} <= environment.keys()
     header = (tmp_path / "out" / "sweep.csv").read_text().splitlines()[0]

@@ -13,6 +13,7 @@ from small_scenes import mixed_scene
 from incpt.benchmarks import scenes
 from incpt.benchmarks.experiment import run
 from incpt.benchmarks.peers import compare
+from incpt.benchmarks.peers.mitsuba_peer import MOST_LANES, passes
 from incpt.benchmarks.peers.peer import PEERS, FloatImage, Job, MissingPeer
 from incpt.benchmarks.peers.worker import Worker
 from incpt.benchmarks.pictures import Gallery
@@ -146,6 +147,13 @@ def test_finished_comparison_starts_nobody(
 @pytest.mark.parametrize(("wanted", "count"), [(0.2, 4), (5, 4), (7, 8), (17, 16), (100, 96), (1e9, 4096)])
 def test_sample_counts(wanted: float, count: int) -> None:
     assert compare.sample_count(wanted) == count
+
+
+def test_wavefronts_fit_the_memory() -> None:
+    assert passes(16, 512 * 512) == [16]
+    assert sum(passes(1000, 512 * 512)) == 1000
+    assert max(passes(1000, 512 * 512)) * 512 * 512 <= MOST_LANES
+    assert passes(2, 2 * MOST_LANES) == [1, 1]
 
 
 def test_bounces_of_renderers_that_count_all_alike() -> None:

@@ -33,7 +33,7 @@ class IncptPeer:
         session = self._prepared(spp, seed)
         began = time.perf_counter()
         session.render(spp)
-        session.device.finish()
+        session.image()
         return time.perf_counter() - began
 
     def image(self, spp: int, seed: int) -> FloatImage:

@@ -14,6 +14,8 @@ from incpt.scene import Vector
 
 # Mitsuba counts segments of a path: one to the first hit, one to the light.
 _SEGMENTS_BESIDE_BOUNCES = 2
+MOST_LANES = 1 << 25
+"""Paths that are traced at a time: a wavefront takes a few hundred bytes for each."""
 
 
 class MitsubaPeer:
@@ -80,5 +82,16 @@ class MitsubaPeer:
         return time.perf_counter() - began
 
     def _render(self, spp: int, seed: int) -> FloatImage:
-        # The array waits until the picture is done.
-        return np.array(self._mi.render(self._loaded, spp=spp, seed=seed), np.float32)
+        assert self._job is not None
+        total = np.zeros((*reversed(self._job.size), 3), np.float64)
+        for i, part in enumerate(passes(spp, self._job.pixels)):
+            # The array waits until the picture is done.
+            total += part * np.array(self._mi.render(self._loaded, spp=part, seed=seed + (i << 16)))
+        return (total / spp).astype(np.float32)
+
+
+def passes(spp: int, pixels: int) -> list[int]:
+    """Samples per pixel of each render, so that no wavefront is larger than the memory."""
+    most = max(MOST_LANES // pixels, 1)
+    whole, rest = divmod(spp, most)
+    return [most] * whole + [rest] * (rest > 0)
