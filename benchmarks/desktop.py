@@ -86,9 +86,10 @@ class Hand:
             if time.monotonic() > end:
                 raise TimeoutError(f"the editor did not come to it within {timeout:g} s; {self._state()}")
             self.app.turn()
-        for _ in range(frames):
+        while frames > 0 or _has_input():
             self.app.window.redraw()
             self.app.turn()
+            frames -= 1
 
     def place(self, name: str) -> tuple[float, float, float, float]:
         """Where a widget is: left, top, right, bottom. Raises LookupError with the names there are."""
@@ -248,6 +249,13 @@ def ask_to_close(window: int) -> None:
     x11.XSendEvent(display, ctypes.c_ulong(window), False, ctypes.c_long(0), ctypes.byref(message))
     x11.XSync(display, False)
     x11.XCloseDisplay(display)
+
+
+def _has_input() -> bool:
+    """Whether imgui has not come to all of the input yet: of keys and letters it takes some a frame."""
+    from imgui_bundle import imgui
+
+    return len(imgui.get_current_context().input_events_queue) > 0
 
 
 def _xdotool(*arguments: str) -> None:
