@@ -372,6 +372,10 @@ def test_the_outliner_selects_hides_and_renames(user: Desk) -> None:
     with user.held_keys("Ctrl"):
         user.click("object red cube")
     assert user.editor.selection.names == ("lamp", "red cube")
+    with user.held_keys("Shift"):
+        user.click("object floor")
+    assert set(user.editor.selection.names) == {"lamp", "red cube", "floor"}
+    assert user.editor.selection.active == "floor"
     before = state(user.editor)
     user.click("visible floor")
     assert changes(before, state(user.editor)) == {"scene.objects.floor.visible"} and user.undo_count == 1

@@ -56,3 +56,12 @@ def test_names_that_left_the_scene_are_dropped() -> None:
 
 def test_all_are_those_that_are_shown() -> None:
     assert Selection.all_of(SCENE).names == ("a", "c")
+
+
+def test_shift_takes_everything_in_between() -> None:
+    order = ("a", "b", "c", "d")
+    assert Selection(("b",)).extended("d", order).names == ("b", "c", "d")
+    assert Selection(("c",)).extended("a", order).names == ("b", "c", "a")
+    assert Selection(("d", "b")).extended("c", order).names == ("d", "b", "c")
+    assert Selection().extended("c", order).names == ("c",)
+    assert Selection(("gone",)).extended("c", order).names == ("c",)

@@ -20,6 +20,7 @@ from imgui_bundle import imgui, implot
 
 from incpt.scene import Image, Mesh, Scene
 from incpt.ui import commands, menus, places, theme
+from incpt.ui.app import take_frame
 from incpt.ui.document import Document
 from incpt.ui.editor import Editor
 from incpt.ui.preferences import Preferences
@@ -64,10 +65,7 @@ class Desk:
         """What `App.frame` does, without a window."""
         self.editor.receive()
         self._begin(seconds)
-        self.rect = self.workspace.draw(self.editor)
-        is_held = self.viewport.update(self.editor, self.rect, None) or imgui.is_any_item_active()
-        self.editor.is_flying = self.viewport.is_flying
-        self.editor.settle(is_held)
+        self.rect = take_frame(self.editor, self.workspace, self.viewport)
         self._end()
         self.on_frame()
 

@@ -14,6 +14,7 @@ from incpt.ui import actions, preferences, recovery
 from incpt.ui.display import Display
 from incpt.ui.document import Document
 from incpt.ui.editor import Editor
+from incpt.ui.overlays import Overlay
 from incpt.ui.renderer import ThreadedRenderer
 from incpt.ui.viewport import Rect, Viewport
 from incpt.ui.window import Window
@@ -88,11 +89,7 @@ class App:
             self.display.upload(editor.frame.pictures, editor.frame.aovs)
             self.shown_frame = editor.frame
         window.begin_frame()
-        self._rect = self.workspace.draw(editor)
-        is_held = self.viewport.update(editor, self._rect, self.display.overlay())
-        is_held = is_held or imgui.is_any_item_active()
-        editor.is_flying = self.viewport.is_flying
-        editor.settle(is_held)
+        self._rect = take_frame(editor, self.workspace, self.viewport, self.display.overlay())
         window.set_title(editor.title)
         window.end_frame(self._draw_below, is_swapped)
         self._keep_preferences()
@@ -141,6 +138,18 @@ class App:
 
     def _autosave(self) -> None:
         self.editor.attempt(lambda: self.recovery.update(self.editor.document, self.editor.now()))
+
+
+def take_frame(
+    editor: Editor, workspace: Workspace, viewport: Viewport, overlay: Overlay | None = None
+) -> Rect:
+    """The part of a frame between imgui's begin and end: draw everything, and take its edits. Returns the
+    rectangle of the picture, in points."""
+    rect = workspace.draw(editor)
+    is_held = viewport.update(editor, rect, overlay) or imgui.is_any_item_active()
+    editor.is_flying = viewport.is_flying
+    editor.settle(is_held)
+    return rect
 
 
 def main(file: Path | None, device: str | None) -> int:

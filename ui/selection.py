@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from incpt.scene import Scene
@@ -48,6 +48,14 @@ class Selection:
         if name in self.names:
             return Selection(tuple(n for n in self.names if n != name))
         return Selection((*self.names, name))
+
+    def extended(self, name: str, order: Sequence[str]) -> Selection:
+        """With everything between the active name and that one in a list, as by Shift."""
+        if self.active not in order:
+            return Selection((name,))
+        first, last = order.index(self.active), order.index(name)
+        between = order[min(first, last) : max(first, last) + 1]
+        return Selection((*self.names, *between, name))
 
     def renamed(self, old: str, new: str) -> Selection:
         """The same objects after one was given another name."""

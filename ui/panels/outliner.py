@@ -32,7 +32,7 @@ def draw(scene: Scene, selection: Selection, search: str) -> tuple[Outcome, str]
         clipper.begin(len(names))
         while clipper.step():
             for name in names[clipper.display_start : clipper.display_end]:
-                outcome = _row(scene, name, outcome)
+                outcome = _row(scene, name, outcome, names)
         _empty_space(names, scene)
     imgui.end_child()
     if imgui.is_item_clicked() and not imgui.is_any_item_hovered():
@@ -40,7 +40,7 @@ def draw(scene: Scene, selection: Selection, search: str) -> tuple[Outcome, str]
     return outcome, search
 
 
-def _row(scene: Scene, name: str, outcome: Outcome) -> Outcome:
+def _row(scene: Scene, name: str, outcome: Outcome, names: list[str]) -> Outcome:
     obj = scene.object(name)
     selection = outcome.selection
     imgui.push_id(name)
@@ -54,17 +54,22 @@ def _row(scene: Scene, name: str, outcome: Outcome) -> Outcome:
     imgui.pop_style_color()
     places.note(f"object {name}")
     if pressed:
-        additive = imgui.get_io().key_ctrl
-        outcome = Outcome(
-            selection.toggled(name) if additive else Selection((name,)),
-            renaming=name if imgui.is_mouse_double_clicked(0) and not additive else None,
-        )
+        outcome = _pressed(name, selection, names)
     imgui.same_line(width - button + style.item_spacing.x)
     if imgui.small_button("Hide" if obj.visible else "Show"):
         outcome = Outcome(outcome.selection, switched=name)
     places.note(f"visible {name}")
     imgui.pop_id()
     return outcome
+
+
+def _pressed(name: str, selection: Selection, names: list[str]) -> Outcome:
+    io = imgui.get_io()
+    if io.key_ctrl:
+        return Outcome(selection.toggled(name))
+    if io.key_shift:
+        return Outcome(selection.extended(name, names))
+    return Outcome(Selection((name,)), renaming=name if imgui.is_mouse_double_clicked(0) else None)
 
 
 def _empty_space(names: list[str], scene: Scene) -> None:
