@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 _WIDTH = 460.0
 """Of a dialog, in points."""
+_LEAST_BUTTON = 76.0
+"""Width of its buttons, in points."""
 
 
 class Dialog(Protocol):
@@ -115,6 +117,8 @@ class PathDialog:
         name: str = "",
     ) -> None:
         self.title, self.kind, self.is_saving, self.then = title, kind, is_saving, then
+        self._folder = folder
+        """Where a name without a folder belongs: the folder that the dialog began with."""
         self.text = f"{folder}/{name}".replace("//", "/")
         self._is_asked_again = False
         self._native = _native_dialog(title, kind, is_saving, folder) if _has_native_dialogs() else None
@@ -253,7 +257,8 @@ def _end() -> None:
 def _buttons(labels: Sequence[str]) -> int | None:
     """Buttons in a row at the right; the one that was pressed. Enter is the first, Escape the last."""
     style = imgui.get_style()
-    widths = [max(imgui.calc_text_size(label).x + 2 * style.frame_padding.x, 76.0) for label in labels]
+    least = _LEAST_BUTTON * style.font_scale_dpi
+    widths = [max(imgui.calc_text_size(label).x + 2 * style.frame_padding.x, least) for label in labels]
     room = imgui.get_content_region_avail().x - sum(widths) - style.item_spacing.x * (len(labels) - 1)
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(room, 0.0))
     chosen = None

@@ -132,9 +132,9 @@ class Outlined:
         found = [o for o in self.scene.objects if o.name in self.names and o.visible]
 
         def place(obj: Object) -> tuple[bool, float]:
-            return obj.name == self.active, -math.dist(
-                obj.world_bounds.mean(axis=0), self.scene.camera.position
-            )
+            # By the farthest corner, so that a floor comes before what stands on it.
+            ways = np.abs(obj.world_bounds - self.scene.camera.position).max(axis=0)
+            return obj.name == self.active, -float(np.linalg.norm(ways))
 
         return tuple(sorted(found, key=place))
 

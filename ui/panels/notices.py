@@ -42,7 +42,8 @@ def status_text(editor: Editor) -> str:
     if editor.frame is not None:
         picture = editor.frame.pictures[-1]
         parts.append("Paused" if editor.paused else MODE_TEXTS[picture.mode])
-        parts.append(f"{int(picture.tile_spp.min()):,} samples per pixel")
+        samples = int(picture.tile_spp.min())
+        parts.append(f"{samples:,} {'sample' if samples == 1 else 'samples'} per pixel")
         if picture.error is not None:
             parts.append(f"RMSE {picture.error:.5f}")
     names = editor.selection.names
@@ -87,7 +88,7 @@ def draw_building(editor: Editor, rect: Rect) -> None:
     )
     if imgui.begin("##building", None, _FLOATING)[0]:
         imgui.text_unformatted("Compiling the kernels for this device; they are kept for the next start")
-        width = imgui.get_text_line_height() * 24
+        width = imgui.get_item_rect_size().x
         share = building.done / max(building.total, 1)
         imgui.progress_bar(share, imgui.ImVec2(width, 0), f"{building.done} of {building.total}")
         places.note("building")
