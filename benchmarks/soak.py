@@ -12,8 +12,10 @@ import contextlib
 import math
 import os
 import random
+import sys
 import tempfile
 import time
+import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -389,14 +391,14 @@ def soak(
                 run.act()
                 run.megabytes.append((time.monotonic() - start, psutil.Process().memory_info().rss / 2**20))
             _check_memory(run.megabytes)
-        except Exception as error:
+        except Exception:
+            traceback.print_exc()
             output.mkdir(parents=True, exist_ok=True)
             with contextlib.suppress(Exception):
                 run.hand.screenshot(output / "soak.png")
-            raise SoakError(
-                f"{type(error).__name__}: {error}; seed {seed}, {sum(run.counts.values())} actions, "
-                f"the last: {', '.join(run.log[-SHOWN_ACTIONS:])}"
-            ) from error
+            last = ", ".join(run.log[-SHOWN_ACTIONS:])
+            print(f"seed {seed}, action {len(run.log)}; the last: {last}", file=sys.stderr)
+            raise typer.Exit(1) from None
         finally:
             print(*_figures(run, time.monotonic() - start), sep="\n")
 
