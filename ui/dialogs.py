@@ -160,8 +160,12 @@ class PathDialog:
     def _ask_again(self, editor: Editor) -> None:
         editor.dialog, self._is_asked_again = self, True
 
+    def _typed(self) -> Path:
+        is_of_home = self.text.startswith("~")
+        return absolute_path(self.text if is_of_home else os.path.join(self._folder, self.text))
+
     def _take(self, editor: Editor) -> None:
-        path = absolute_path(self.text)
+        path = self._typed()
         if not self.text.strip() or os.path.isdir(path):
             self.text = f"{path}/".replace("//", "/")
             raise InputError(f"{path}: is a folder; name a file in it")
@@ -179,7 +183,7 @@ class PathDialog:
 
     def _draw_folder(self) -> None:
         try:
-            typed = absolute_path(self.text)
+            typed = self._typed()
         except InputError:
             typed = Path(self.text)
         folder = typed if self.text.endswith("/") else typed.parent
