@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from rich.table import Table
 
-from incpt.benchmarks import build, rays, scale, sweep, table51
+from incpt.benchmarks import build, latency, rays, scale, sweep, table51
 from incpt.benchmarks.peers import compare
 from incpt.benchmarks.store import Results, Row
 
@@ -40,6 +40,9 @@ EXPERIMENTS = {
     build.NAME: Experiment("Trees: build, refit, top level", lambda results: [build.table(results)]),
     scale.NAME: Experiment(
         "How cost grows", lambda results: [scale.table(results)], ("size", "max_bounces", "least_s")
+    ),
+    latency.NAME: Experiment(
+        "How soon the editor answers", lambda results: [latency.table(results)], ("size",)
     ),
 }
 

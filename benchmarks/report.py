@@ -47,7 +47,7 @@ def page(folder: Path) -> str:
         for apart, part in results.parts(*experiment.setup):
             parts.append(f"<h3>{escape(setup_text(apart))}</h3>")
             parts += _context(part, experiment.timed)
-            parts += _PLOTS[name](part)
+            parts += _PLOTS[name](part) if name in _PLOTS else ()
             parts += (html_table(table) for table in experiment.tables(part))
         if name == table51.NAME:
             parts += _figures(folder)
