@@ -19,7 +19,6 @@ from incpt import albedo, bvh, layout, lights, transform
 from incpt.device import Device
 from incpt.scene import Change, Mesh, Object, Scene, Vector, diff
 
-
 _NOT_MOVED = np.eye(3, 4)
 _MOST_FACES_ON_TOP = 512
 _MOST_FACES_IN_ALL_ON_TOP = 4096
