@@ -16,7 +16,7 @@ intersect(const Params params, const uint count, __global const uint *list, __gl
     const uint path = list[get_global_id(0)];
     const State state = {rays, paths, hits, 0, 0, params.path_stride, params.buffer_stride};
     const Geometry geometry = {top_nodes, top_packs, nodes, packs, objects, normals};
-    if (trace_path(&geometry, &state, path, path)) {
+    if (trace_path(&geometry, &state, path)) {
         describe_path(&geometry, &state, path);
         store_bits(paths, PATH_CLASS * state.stride + path, surface_class(materials, &state, path));
     } else {

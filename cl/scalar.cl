@@ -17,8 +17,14 @@
 #define REVERSE_BITS(x) reverse_bits(x)
 #endif
 
-// A call that stays a call is not vectorised over either, and LLVM leaves large functions as calls.
+// A call that stays a call is not vectorised over either, and LLVM leaves large functions as calls. Not
+// static under PoCL: LLVM rewrites calls of static functions to leave out what it finds constant or unused,
+// and loses the note on the call that the iterations of a loop are independent.
+#ifdef INCPT_POCL
+#define INLINE inline __attribute__((always_inline))
+#else
 #define INLINE static inline __attribute__((always_inline))
+#endif
 
 #define PI 3.14159265358979f
 #define INV_PI 0.318309886183791f

@@ -11,9 +11,10 @@
 #define TRACE_CALL static inline
 #endif
 
-// Leaves the nearest hit of a path's ray in the hit `slot`, as far as `describe_path` needs it. False, and
-// object NO_INDEX, where the ray leaves the scene.
-TRACE_CALL bool trace_path(const Geometry *geometry, const State *state, uint path, uint slot) {
+// Leaves the nearest hit of a path's ray in its planes, as far as `describe_path` needs it. False, and object
+// NO_INDEX, where the ray leaves the scene. With FEW_ON_TOP a hit with a triangle of the top level is there
+// already, and stays where nothing is nearer.
+TRACE_CALL bool trace_path(const Geometry *geometry, const State *state, uint path) {
     const uint stride = state->stride;
     STATE const float *ray = state->rays + path;
     const float origin[3] = {ray[RAY_ORIGIN_X * stride], ray[RAY_ORIGIN_Y * stride],
@@ -21,9 +22,15 @@ TRACE_CALL bool trace_path(const Geometry *geometry, const State *state, uint pa
     const float direction[3] = {ray[RAY_DIRECTION_X * stride], ray[RAY_DIRECTION_Y * stride],
                                 ray[RAY_DIRECTION_Z * stride]};
     BvhHit hit;
+    STATE float *hits = state->hits + path;
+#ifdef FEW_ON_TOP
+    hit.distance = hits[HIT_DISTANCE * stride];
+    if (!bvh_trace(geometry, origin, direction, false, &hit))
+        return as_uint(hits[HIT_OBJECT * stride]) != NO_INDEX;
+#else
     hit.distance = INFINITY;
     bvh_trace(geometry, origin, direction, false, &hit);
-    STATE float *hits = state->hits + slot;
+#endif
     hits[HIT_DISTANCE * stride] = hit.distance;
     hits[HIT_OBJECT * stride] = as_float(hit.object);
     if (hit.object == NO_INDEX)

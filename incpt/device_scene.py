@@ -21,6 +21,7 @@ from incpt.scene import Change, Mesh, Object, Scene, Vector, diff
 
 _NOT_MOVED = np.eye(3, 4)
 _MOST_FACES_ON_TOP = 512
+_FEW_PACKS = 16
 _MOST_FACES_IN_ALL_ON_TOP = 4096
 """Of one object, and of all, that stand in the top level themselves."""
 
@@ -63,7 +64,12 @@ class DeviceScene:
     def variant(self) -> tuple[str, ...]:
         """What chooses the variants of all kernels that this scene needs: what there is, and what is left out
         of describing a hit."""
-        names = {"MEDIA": self.has_media, "ALL_ON_TOP": self._all_on_top, "FLAT": self._flat}
+        names = {
+            "MEDIA": self.has_media,
+            "ALL_ON_TOP": self._all_on_top,
+            "FLAT": self._flat,
+            "FEW_ON_TOP": 0 < self.top_pack_count <= _FEW_PACKS,
+        }
         return (*self.features, *(name for name, holds in names.items() if holds))
 
     @property
@@ -177,6 +183,12 @@ class DeviceScene:
             "top_packs", triangles.packs if triangles is not None else np.zeros(1, layout.TRIANGLE_PACK)
         )
         self._all_on_top = len(others) == 0
+        self.top_pack_count = 0 if triangles is None else len(triangles.packs)
+        few = 0 < self.top_pack_count <= _FEW_PACKS
+        self._buffers["block_nodes"] = self._buffers["top_nodes"]
+        if few:
+            # Blocks of paths meet those triangles without a tree, and take it for the other objects alone.
+            self._upload("block_nodes", bvh.build_top_with_triangles(self.device, bounds, others, None))
 
     def _build_environment(self) -> None:
         image = self.scene.environment.image

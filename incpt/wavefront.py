@@ -84,10 +84,11 @@ class Wavefront:
         blocks = max(-(-path_count // layout.BLOCK_PATHS), 1)
         kernel = self.device.kernel("trace_blocks", features=scene.variant)
         planes = (layout.RayPlane, layout.PathPlane, layout.HitPlane, layout.ShadowPlane)
-        local = [cl.LocalMemory(4 * n * layout.BLOCK_PATHS) for n in (*map(len, planes), 3, 1, 1)]
+        local = [cl.LocalMemory(4 * n * layout.BLOCK_PATHS) for n in (*map(len, planes), 3, 1, 1, 3, 11)]
         self.device.launch(
-            kernel, blocks, whole, slots, *scene.geometry,
-            scene.buffer("normals"), scene.buffer("layers"), *scene.emitters, *local, radiance, work_group=1,
+            kernel, blocks, whole, slots, scene.buffer("block_nodes"),
+            *scene.geometry[1:], scene.buffer("normals"), scene.buffer("layers"), *scene.emitters, *local,
+            np.uint32(scene.top_pack_count), radiance, work_group=1,
         )  # fmt: skip
 
     def first_hits(

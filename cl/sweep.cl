@@ -1,0 +1,122 @@
+#include "bvh.cl"
+#include "state.cl"
+
+// Rays against all triangles of a small top level, for blocks of paths. Where a scene has few triangles, the
+// way through a tree is a chain of waiting for memory and of wrongly guessed branches; going over all of them
+// with sixteen rays in the lanes has neither.
+//
+// The triangle test is that of bvh.cl. Its axes depend on the largest component of the direction, so that
+// rays are sorted by it; then they are the same for all lanes.
+
+#define SWEEP_WIDTH 16
+
+// Planes of rays that are ready for the test, in its axes, and of what it finds.
+#define SWEEP_ORIGIN 0
+#define SWEEP_SHEAR 3
+#define SWEEP_LIMIT 6 // then the distance
+#define SWEEP_WEIGHT 7
+#define SWEEP_PLACE 10 // as HIT_TRIANGLE has it
+#define SWEEP_PLANES 11
+
+typedef struct {
+    __global const TrianglePack *packs;
+    uint pack_count;
+    __local float *planes;
+} Sweep;
+
+INLINE float16 sweep_load(__local const float *place) {
+    typedef float16 Unaligned __attribute__((aligned(4)));
+    return *(__local const Unaligned *)place;
+}
+
+INLINE void sweep_store(__local float *place, float16 value) {
+    typedef float16 Unaligned __attribute__((aligned(4)));
+    *(__local Unaligned *)place = value;
+}
+
+INLINE bool sweep_any(const int16 comparison) {
+#ifdef __AVX512DQ__
+    return __builtin_ia32_cvtd2mask512(comparison) != 0;
+#else
+    return (bvh_lanes(comparison.lo) | bvh_lanes(comparison.hi)) != 0;
+#endif
+}
+
+// Twice the signed area between the ray and an edge; see bvh_edge.
+INLINE float16 sweep_edge(const float16 ax, const float16 ay, const float16 bx, const float16 by) {
+#pragma OPENCL FP_CONTRACT OFF
+    return ax * by - ay * bx;
+}
+
+// Tests sixteen rays, from place `first` on, against all triangles; `axis` is the largest of their
+// directions.
+INLINE void sweep_rays(const Sweep *sweep, uint first, uint axis) {
+    __local float *planes = sweep->planes + first;
+    const uint x = axis == 2 ? 0 : axis + 1, y = axis == 0 ? 2 : axis - 1;
+    float16 origin[3], shear[3], weight[3];
+    for (uint i = 0; i < 3; i++) {
+        origin[i] = sweep_load(planes + (SWEEP_ORIGIN + i) * BLOCK_PATHS);
+        shear[i] = sweep_load(planes + (SWEEP_SHEAR + i) * BLOCK_PATHS);
+        weight[i] = 0.0f;
+    }
+    float16 limit = sweep_load(planes + SWEEP_LIMIT * BLOCK_PATHS);
+    uint16 place = NO_INDEX;
+    for (uint p = 0; p < sweep->pack_count; p++) {
+        __global const TrianglePack *pack = sweep->packs + p;
+        for (uint lane = 0; lane < BVH_WIDTH && pack->face[lane] != NO_INDEX; lane++) {
+            const float16 az = pack->vertex[axis][lane] - origin[2];
+            const float16 bz = pack->vertex[3 + axis][lane] - origin[2];
+            const float16 cz = pack->vertex[6 + axis][lane] - origin[2];
+            const float16 ax = (pack->vertex[x][lane] - origin[0]) - shear[0] * az;
+            const float16 bx = (pack->vertex[3 + x][lane] - origin[0]) - shear[0] * bz;
+            const float16 cx = (pack->vertex[6 + x][lane] - origin[0]) - shear[0] * cz;
+            const float16 ay = (pack->vertex[y][lane] - origin[1]) - shear[1] * az;
+            const float16 by = (pack->vertex[3 + y][lane] - origin[1]) - shear[1] * bz;
+            const float16 cy = (pack->vertex[6 + y][lane] - origin[1]) - shear[1] * cz;
+            const float16 u = sweep_edge(cx, cy, bx, by), v = sweep_edge(ax, ay, cx, cy),
+                          w = sweep_edge(bx, by, ax, ay);
+            const float16 lowest = BVH_MIN8(BVH_MIN8(u, v), w), highest = BVH_MAX8(BVH_MAX8(u, v), w);
+            const float16 determinant = u + v + w, depth = (u * az + v * bz + w * cz) * shear[2];
+            const int16 sign = as_int16(determinant) & INT_MIN;
+            const float16 size = as_float16(as_int16(determinant) ^ sign);
+            const float16 scaled = as_float16(as_int16(depth) ^ sign);
+            const int16 met =
+                ((lowest >= 0.0f) | (highest <= 0.0f)) & (scaled > 0.0f) & (scaled < size * limit);
+            if (!sweep_any(met))
+                continue;
+            limit = met ? depth / determinant : limit;
+            weight[0] = met ? u : weight[0];
+            weight[1] = met ? v : weight[1];
+            weight[2] = met ? w : weight[2];
+            place = met ? (uint16)((p * BVH_WIDTH + lane) | NODE_PACK) : place;
+        }
+    }
+    sweep_store(planes + SWEEP_LIMIT * BLOCK_PATHS, limit);
+    for (uint i = 0; i < 3; i++)
+        sweep_store(planes + (SWEEP_WEIGHT + i) * BLOCK_PATHS, weight[i]);
+    sweep_store(planes + SWEEP_PLACE * BLOCK_PATHS, as_float16(place));
+}
+
+// Makes the ray in planes `ray` of a path ready: origin and direction, BLOCK_PATHS apart, x first.
+INLINE void sweep_prepare(const Sweep *sweep, uint place, __local const float *ray, uint path, uint axis,
+                          float limit) {
+    __local float *planes = sweep->planes + place;
+    const uint x = axis == 2 ? 0 : axis + 1, y = axis == 0 ? 2 : axis - 1;
+    __local const float *direction = ray + 3 * BLOCK_PATHS;
+    const float inverse = 1.0f / direction[axis * BLOCK_PATHS + path];
+    planes[(SWEEP_ORIGIN + 0) * BLOCK_PATHS] = ray[x * BLOCK_PATHS + path];
+    planes[(SWEEP_ORIGIN + 1) * BLOCK_PATHS] = ray[y * BLOCK_PATHS + path];
+    planes[(SWEEP_ORIGIN + 2) * BLOCK_PATHS] = ray[axis * BLOCK_PATHS + path];
+    planes[(SWEEP_SHEAR + 0) * BLOCK_PATHS] = direction[x * BLOCK_PATHS + path] * inverse;
+    planes[(SWEEP_SHEAR + 1) * BLOCK_PATHS] = direction[y * BLOCK_PATHS + path] * inverse;
+    planes[(SWEEP_SHEAR + 2) * BLOCK_PATHS] = inverse;
+    planes[SWEEP_LIMIT * BLOCK_PATHS] = limit;
+}
+
+// The largest component of a path's ray.
+INLINE uint sweep_axis(__local const float *ray, uint path) {
+    __local const float *direction = ray + 3 * BLOCK_PATHS + path;
+    const float x = FABS(direction[0]), y = FABS(direction[BLOCK_PATHS]),
+                z = FABS(direction[2 * BLOCK_PATHS]);
+    return x > y ? (x > z ? 0u : 2u) : (y > z ? 1u : 2u);
+}
