@@ -24,9 +24,14 @@ INLINE void store_medium_stack(const State *state, uint path, const MediumStack 
     store_bits(state->paths, PATH_MEDIUM_1 * state->stride + path, stack->entry[2] | (stack->entry[3] << 16));
 }
 
+// The properties of a medium, or of any material in place of none: all lanes read one.
+INLINE __global const Material *medium_material(__global const Material *materials, uint medium) {
+    return &materials[medium == MEDIUM_NONE ? 0u : medium];
+}
+
 // The higher wins; 0 is the highest of all.
-INLINE uint effective_priority(__global const Material *materials, uint material) {
-    uint priority = materials[material].priority;
+INLINE uint effective_priority(__global const Material *materials, uint medium) {
+    uint priority = medium_material(materials, medium)->priority;
     return priority == 0u ? 0xffffffffu : priority;
 }
 
@@ -35,35 +40,37 @@ INLINE void enter_medium(MediumStack *stack, __global const Material *materials,
     uint priority = effective_priority(materials, material);
     uint carried = material;
     int placed = 0;
+#pragma unroll
     for (uint i = 0u; i < MEDIUM_STACK_SIZE; i++) {
         uint here = stack->entry[i];
-        if (!placed && here != MEDIUM_NONE && effective_priority(materials, here) > priority)
-            continue;
-        placed = 1;
-        stack->entry[i] = carried;
-        carried = here;
+        int wins = (here != MEDIUM_NONE) & (effective_priority(materials, here) > priority);
+        placed |= !wins;
+        stack->entry[i] = placed ? carried : here;
+        carried = placed ? here : carried;
     }
 }
 
 // Takes the first entry of that medium out; returns whether there was one.
 INLINE int leave_medium(MediumStack *stack, uint material) {
     int found = 0;
+#pragma unroll
     for (uint i = 0u; i < MEDIUM_STACK_SIZE; i++) {
+        uint next = i + 1u < MEDIUM_STACK_SIZE ? stack->entry[(i + 1u) % MEDIUM_STACK_SIZE] : MEDIUM_NONE;
         found |= stack->entry[i] == material;
-        if (found)
-            stack->entry[i] = i + 1u < MEDIUM_STACK_SIZE ? stack->entry[i + 1u] : MEDIUM_NONE;
+        stack->entry[i] = found ? next : stack->entry[i];
     }
     return found;
 }
 
 INLINE float medium_ior(__global const Material *materials, uint medium) {
-    return medium == MEDIUM_NONE ? 1.0f : materials[medium].ior;
+    float ior = medium_material(materials, medium)->ior;
+    return medium == MEDIUM_NONE ? 1.0f : ior;
 }
 
 // What a medium lets through over a distance in metres, which may be infinite (Beer and Lambert).
 INLINE Vec3 transmittance(__global const Material *materials, uint medium, float distance) {
     int vacuum = medium == MEDIUM_NONE;
-    __global const float *a = materials[vacuum ? 0u : medium].absorption;
+    __global const float *a = medium_material(materials, medium)->absorption;
     Vec3 depth = vec3(a[0] > 0.0f ? a[0] * distance : 0.0f, a[1] > 0.0f ? a[1] * distance : 0.0f,
                       a[2] > 0.0f ? a[2] * distance : 0.0f);
     depth = choose(vacuum, vec3(0.0f, 0.0f, 0.0f), depth);

@@ -20,6 +20,7 @@
 
 typedef struct {
     __global const TrianglePack *packs;
+    __global const float *bounds; // of each pack: least and greatest x, y and z
     uint pack_count;
     __local float *planes;
 } Sweep;
@@ -48,20 +49,47 @@ INLINE float16 sweep_edge(const float16 ax, const float16 ay, const float16 bx, 
     return ax * by - ay * bx;
 }
 
+// Which rays meet a box between 0 and their limit, to be on the safe side; as bvh_boxes tells it of many
+// boxes and one ray. `inverse` is that of the direction, `least` the distance that counts as none, in the
+// axes of the rays.
+INLINE int16 sweep_box(__global const float *bounds, const uint *axes, const float16 *origin,
+                       const float16 *inverse, const float16 *least, float16 limit) {
+    float16 near = 0.0f, far = limit;
+    for (uint i = 0; i < 3; i++) {
+        const float16 a = (bounds[2 * axes[i]] - origin[i]) * inverse[i];
+        const float16 b = (bounds[2 * axes[i] + 1] - origin[i]) * inverse[i];
+        near = BVH_MAX8(BVH_MIN8(a, b) - least[i], near);
+        far = BVH_MIN8(BVH_MAX8(a, b) + least[i], far);
+    }
+    return near <= far * (1.0f + BVH_SLACK);
+}
+
 // Tests sixteen rays, from place `first` on, against all triangles; `axis` is the largest of their
 // directions.
 INLINE void sweep_rays(const Sweep *sweep, uint first, uint axis) {
     __local float *planes = sweep->planes + first;
     const uint x = axis == 2 ? 0 : axis + 1, y = axis == 0 ? 2 : axis - 1;
-    float16 origin[3], shear[3], weight[3];
+    const uint axes[3] = {x, y, axis};
+    float16 origin[3], shear[3], weight[3], inverse[3], least[3];
     for (uint i = 0; i < 3; i++) {
         origin[i] = sweep_load(planes + (SWEEP_ORIGIN + i) * BLOCK_PATHS);
         shear[i] = sweep_load(planes + (SWEEP_SHEAR + i) * BLOCK_PATHS);
         weight[i] = 0.0f;
     }
     float16 limit = sweep_load(planes + SWEEP_LIMIT * BLOCK_PATHS);
+    for (uint i = 0; i < 2; i++) {
+        const int16 sign = as_int16(shear[i]) & INT_MIN;
+        const int16 zero = as_float16(as_int16(shear[i]) ^ sign) < BVH_ZERO;
+        inverse[i] = shear[2] / (zero ? as_float16(sign | as_int16((float16)(BVH_ZERO))) : shear[i]);
+        // Without a direction the ray lies between the planes or not; on a plane it counts as between.
+        least[i] = zero ? (float16)(BVH_INVERSE_ZERO * 1e-10f) : (float16)(0.0f);
+    }
+    inverse[2] = shear[2];
+    least[2] = 0.0f;
     uint16 place = NO_INDEX;
     for (uint p = 0; p < sweep->pack_count; p++) {
+        if (!sweep_any(sweep_box(sweep->bounds + 6 * p, axes, origin, inverse, least, limit)))
+            continue;
         __global const TrianglePack *pack = sweep->packs + p;
         for (uint lane = 0; lane < BVH_WIDTH && pack->face[lane] != NO_INDEX; lane++) {
             const float16 az = pack->vertex[axis][lane] - origin[2];

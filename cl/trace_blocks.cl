@@ -155,6 +155,18 @@ INLINE void trace_shadows(const Geometry *geometry, const Sweep *sweep, const St
 #endif
 #endif
 
+#ifdef MEDIA
+// The paths of a class, in order; returns how many.
+INLINE uint list_class(const State *state, uint path_class, uint count, __local uint *list) {
+    uint length = 0;
+    for (uint i = 0; i < count; i++) {
+        list[length] = i;
+        length += load_bits(state->paths, PATH_CLASS * BLOCK_PATHS + i) == path_class;
+    }
+    return length;
+}
+#endif
+
 // Moves plane p of the paths in `list`, which is sorted, to the front.
 INLINE void move_plane(__local float *plane, __local const uint *list, uint count) {
     LANES
@@ -173,20 +185,22 @@ INLINE void move_paths(const State *state, __local const uint *list, uint count)
     move_plane(state->hits + HIT_TRIANGLE * BLOCK_PATHS, list, count);
 }
 
-__kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void trace_blocks(
-    const Params params, __global const Slot *slots, __global const Node *top_nodes,
-    __global const TrianglePack *top_packs, __global const Node *nodes, __global const TrianglePack *packs,
-    __global const Object *objects, __global const Material *materials, __global const float *normals,
-    __global const float *layers, __global const float *lights, __global const float *environment_image,
-    __global const float *environment_marginal, __global const float *environment_conditional,
-    __global const float *environment_pdf, __local float *rays, __local float *paths, __local float *hits,
-    __local float *shadows, __local float *radiance, __local uint *list, __local uint *escaped,
-    __local uint *by_axis, __local float *swept, const uint top_pack_count, __global float *path_buffer) {
+__kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
+trace_blocks(const Params params, __global const Slot *slots, __global const Node *top_nodes,
+             __global const TrianglePack *top_packs, __global const Node *nodes,
+             __global const TrianglePack *packs, __global const Object *objects,
+             __global const Material *materials, __global const float *normals, __global const float *layers,
+             __global const float *lights, __global const float *environment_image,
+             __global const float *environment_marginal, __global const float *environment_conditional,
+             __global const float *environment_pdf, __local float *rays, __local float *paths,
+             __local float *hits, __local float *shadows, __local float *radiance, __local uint *list,
+             __local uint *escaped, __local uint *by_axis, __local float *swept,
+             __global const float *top_bounds, const uint top_pack_count, __global float *path_buffer) {
     const State state = {rays, paths, hits, shadows, radiance, BLOCK_PATHS, BLOCK_PATHS};
     const Geometry geometry = {top_nodes, top_packs, nodes, packs, objects, normals};
     const Emitters emitters = {
         materials, lights, environment_image, environment_marginal, environment_conditional, environment_pdf};
-    const Sweep sweep = {top_packs, top_pack_count, swept};
+    const Sweep sweep = {top_packs, top_bounds, top_pack_count, swept};
     const uint first = (uint)get_group_id(0) * BLOCK_PATHS;
     const uint size = first < params.path_count ? MIN(params.path_count - first, BLOCK_PATHS) : 0;
     __local uint *results = (__local uint *)paths + PATH_RESULT * BLOCK_PATHS;
@@ -226,15 +240,19 @@ __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void trace_blocks(
             illuminate_path(&params, &emitters, &state, i);
 #endif
 #ifdef MEDIA
-        uint surfaces = 0;
-        for (uint i = 0; i < count; i++) {
-            uint path_class = surface_class(materials, &state, i);
-            if (path_class == CLASS_MEDIUM) {
-                shade_medium_path(&params, materials, &state, i, results[i]);
-                path_class = load_bits(paths, PATH_CLASS * BLOCK_PATHS + i);
-            }
-            if (path_class == CLASS_SURFACE)
-                list[surfaces++] = i;
+        LANES
+        for (int i = 0; i < (int)count; i++)
+            store_bits(paths, PATH_CLASS * BLOCK_PATHS + i, surface_class(materials, &state, i));
+        __local uint *media_list = escaped; // which have had their end
+        uint surfaces = list_class(&state, CLASS_SURFACE, count, list);
+        uint media = list_class(&state, CLASS_MEDIUM, count, media_list);
+        LANES
+        for (int i = 0; i < (int)media; i++)
+            shade_medium_path(&params, materials, &state, media_list[i], results[media_list[i]]);
+        // Those that stand on an opaque surface after all.
+        for (uint i = 0; i < media; i++) {
+            list[surfaces] = media_list[i];
+            surfaces += load_bits(paths, PATH_CLASS * BLOCK_PATHS + media_list[i]) == CLASS_SURFACE;
         }
         LANES
         for (int i = 0; i < (int)surfaces; i++)

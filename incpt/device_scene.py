@@ -68,6 +68,7 @@ class DeviceScene:
             "MEDIA": self.has_media,
             "ALL_ON_TOP": self._all_on_top,
             "FLAT": self._flat,
+            "SMOOTH_MEDIA": self.has_media and self._smooth_media,
             "FEW_ON_TOP": 0 < self.top_pack_count <= _FEW_PACKS,
         }
         return (*self.features, *(name for name, holds in names.items() if holds))
@@ -160,7 +161,7 @@ class DeviceScene:
         self._build_top(vertices)
 
     def _build_top(self, vertices: dict[int, npt.NDArray[np.float32]]) -> None:
-        """The top level; `vertices` are those in world space of the objects whose triangles are part of it."""
+        """The top level; `vertices`: in world space, those of the objects whose triangles are part of it."""
         objects = self.scene.objects
         others = np.array([i for i in range(len(objects)) if i not in vertices], np.int64)
         bounds = np.array([objects[i].world_bounds for i in others]).reshape(-1, 2, 3)
@@ -185,6 +186,10 @@ class DeviceScene:
         self._all_on_top = len(others) == 0
         self.top_pack_count = 0 if triangles is None else len(triangles.packs)
         few = 0 < self.top_pack_count <= _FEW_PACKS
+        self._upload(
+            "top_bounds",
+            bvh.pack_bounds(triangles.packs) if few and triangles is not None else np.zeros(6, np.float32),
+        )
         self._buffers["block_nodes"] = self._buffers["top_nodes"]
         if few:
             # Blocks of paths meet those triangles without a tree, and take it for the other objects alone.
@@ -231,7 +236,9 @@ class DeviceScene:
                 flags.TRANSMISSIVE if material.transmission > 0 else 0
             )
             layer[:] = albedo.layer_row(material)
-        self.has_media = any(material.transmission > 0 for material in materials)
+        media = [material for material in materials if material.transmission > 0]
+        self.has_media = bool(media)
+        self._smooth_media = all(material.roughness**2 <= layout.MIN_ALPHA for material in media)
         self._upload("materials", rows)
         self._upload("layers", layers)
 
@@ -251,8 +258,8 @@ def _emission_changed(change: Change) -> bool:
 
 
 def _objects_on_top(objects: Sequence[Object]) -> list[int]:
-    """The objects whose triangles become part of the top level, smallest first: rays need no way into the space of
-    the object then. Only so many that moving one costs milliseconds."""
+    """The objects whose triangles become part of the top level, smallest first: rays need no way into the
+    space of the object then. Only so many that moving one costs milliseconds."""
     small = [i for i, obj in enumerate(objects) if obj.visible and len(obj.mesh.faces) <= _MOST_FACES_ON_TOP]
     small.sort(key=lambda i: len(objects[i].mesh.faces))
     total = np.cumsum([len(objects[i].mesh.faces) for i in small])

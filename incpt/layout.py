@@ -29,15 +29,15 @@ NODE_EMPTY = 0xFFFFFFFF
 NODE_LEAF = 0x80000000
 """Flag of a child reference: the other bits are a pack (bottom level) or an object (top level)."""
 NODE_PACK = 0x40000000
-"""Flag of a leaf of the top level that is a pack of triangles in world space and no object. Also marks the place
-of a hit in such a pack."""
+"""Flag of a leaf of the top level that is a pack of triangles in world space and no object. Also marks the
+place of a hit in such a pack."""
 NO_INDEX = 0xFFFFFFFF
 """'None' for every unsigned index: no hit, no triangle, no normals, no medium."""
 
 WORK_GROUP_SIZE = 64
 """Work-items per group of the path kernels; lists of paths are padded to a multiple of it."""
 
-BLOCK_PATHS = 512
+BLOCK_PATHS = 1024
 """Paths that one work-item of `trace_blocks` takes from start to end: their state fits into a cache."""
 
 COMPACT_BLOCK = 64

@@ -88,7 +88,7 @@ class Wavefront:
         self.device.launch(
             kernel, blocks, whole, slots, scene.buffer("block_nodes"),
             *scene.geometry[1:], scene.buffer("normals"), scene.buffer("layers"), *scene.emitters, *local,
-            np.uint32(scene.top_pack_count), radiance, work_group=1,
+            scene.buffer("top_bounds"), np.uint32(scene.top_pack_count), radiance, work_group=1,
         )  # fmt: skip
 
     def first_hits(

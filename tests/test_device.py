@@ -183,7 +183,14 @@ def test_devices_agree(device: Device) -> None:
 
 
 LIGHTS = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS")
-VARIANTS = [lights + media for lights in ((), LIGHTS[:1], LIGHTS[1:], LIGHTS) for media in ((), ("MEDIA",))]
+RESTRICTIONS = ("ALL_ON_TOP", "FEW_ON_TOP", "FLAT", "SMOOTH_MEDIA")
+VARIANTS = [
+    *(lights + media for lights in ((), LIGHTS[:1], LIGHTS[1:], LIGHTS) for media in ((), ("MEDIA",))),
+    ("MEDIA", *RESTRICTIONS),
+    (*LIGHTS, "MEDIA", *RESTRICTIONS),
+    (*LIGHTS, *RESTRICTIONS[:3]),
+    (*LIGHTS, *RESTRICTIONS[1:2]),
+]
 
 
 def remarks_on_vectorisation(device: Device, text: str) -> list[str]:

@@ -521,7 +521,7 @@ def test_render_reports_every_step(device: Device) -> None:
     assert all(report.paths == 24 * 64 and report.seconds > 0 for report in reports)
 
 
-@pytest.mark.parametrize(("of_one", "of_all"), [(0, 0), (512, 20), (10000, 100000)])
+@pytest.mark.parametrize(("of_one", "of_all"), [(0, 0), (512, 20), (512, 15), (10000, 100000)])
 def test_triangles_on_top_look_like_objects(
     device: Device, monkeypatch: pytest.MonkeyPatch, of_one: int, of_all: int
 ) -> None:
