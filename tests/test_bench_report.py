@@ -127,7 +127,8 @@ def test_growth_of_cost(tmp_path: Path, device: Device) -> None:
     found = run(Store(tmp_path, scale.NAME), scale.tasks(device, plan), {"id": "e"})
     points, law = scale.growth(found, "resolution")
     assert [x for x, _ in points] == [1024, 4096, 16384]
-    assert law is not None and 0 < law.exponent < 1.5
+    assert law is not None and law.error is not None
+    assert all(r.values["paths_per_second"] > 0 for r in found.records)
     assert scale.growth(found, "bounces") == ([], None)
     assert scale.table(found).row_count == 2
 
@@ -225,6 +226,7 @@ def test_report_of_every_experiment(tmp_path: Path) -> None:
     assert text.count("<svg") == 2 + 1 + 3 + 1 + 1
     assert "turn &amp; move" in text and "<b>turn & move" not in text
     assert text.count("n^0.50") >= 2
+    assert "<b>million rays per second</b>" in text
 
 
 def test_report_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
