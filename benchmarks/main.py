@@ -37,7 +37,8 @@ def _bench(context: typer.Context) -> None:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run a benchmark and return its exit status. Raises what `incpt.cli` explains: InputError, Stopped ..."""
+    """Run a benchmark and return its exit status. Raises InputError, Stopped and others, which `incpt.cli`
+    explains."""
     try:
         result = app(list(arguments), prog_name="incpt bench", standalone_mode=False)
     except Exception as error:

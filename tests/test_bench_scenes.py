@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
+import os
+import signal
 from dataclasses import replace
 from pathlib import Path
 
@@ -175,7 +177,9 @@ def test_incpt_as_a_worker() -> None:
         assert 0 < worker.move("tall", (x + 0.1, y, z), seed=5) < 30
         with pytest.raises(MissingPeer, match="no such thing"):
             worker.move("no such thing", (0, 0, 0), seed=5)
-        assert worker.time(1, seed=6) > 0  # a mistake does not end it
+        # Neither a mistake nor Ctrl-C, which reaches the whole group, ends it.
+        os.kill(worker._process.pid or 0, signal.SIGINT)
+        assert worker.time(1, seed=6) > 0
     finally:
         worker.close()
     with pytest.raises(MissingPeer, match="ended"):
