@@ -1,5 +1,5 @@
 # For those whose fingers type make; everything is in ./run.
-.PHONY: demo test lint edit bench pictures
+.PHONY: demo test lint edit bench pictures screenshots
 demo test lint edit bench:
 	./run $@
 
@@ -9,3 +9,7 @@ pictures:
 	./run replay scenes/editing.toml scenes/pictures/rotate.edits.toml -o out/rotate --size 480x270 \
 		--nor 64 --base-spp 512 --reference-spp 1024
 	cp out/rotate/sheet.png scenes/pictures/rotate.png
+
+# Those of the editor; they need Xvfb and xdotool.
+screenshots:
+	./run bench screenshots

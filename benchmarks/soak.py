@@ -80,13 +80,23 @@ class Soak:
     # ------------------------------------------------------------------------------------- one action
 
     def act(self) -> None:
-        """One action, and the checks after it."""
-        action = self.random.choices(list(_ACTIONS), list(_ACTIONS.values()))[0]
+        """A random action, and the checks after it."""
+        self.do(self.random.choices(list(_ACTIONS), list(_ACTIONS.values()))[0])
+
+    def do(self, action: Callable[[Soak], None]) -> None:
+        """An action, and the checks after it."""
         name = action.__name__.strip("_")
         self.log.append(name)
         self.counts[name] += 1
         action(self)
         self.check()
+
+    def warm_up(self) -> None:
+        """Everything once, before memory is watched: kernels, a second session, first-hit images."""
+        for action in _ACTIONS:
+            self.do(action)
+        for action in (_switch_split, _type_transform, _choose_overlay, _drag_transform, _switch_split):
+            self.do(action)
 
     def check(self) -> None:
         """Wait until the editor rests, and compare."""
@@ -265,6 +275,10 @@ def _press_key(soak: Soak) -> None:
     soak.hand.key(key)
 
 
+def _switch_split(soak: Soak) -> None:
+    soak.hand.key("F6")
+
+
 def _choose_overlay(soak: Soak) -> None:
     from incpt.ui.commands import OVERLAY_NAMES
 
@@ -387,6 +401,7 @@ def soak(
     with opened(seed) as run:
         start = time.monotonic()
         try:
+            run.warm_up()
             while time.monotonic() - start < 60 * minutes:
                 run.act()
                 run.megabytes.append((time.monotonic() - start, psutil.Process().memory_info().rss / 2**20))
