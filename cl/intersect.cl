@@ -18,7 +18,8 @@ intersect(const Params params, const uint count, __global const uint *list, __gl
     const Geometry geometry = {top_nodes, top_packs, nodes, packs, objects, normals};
     if (trace_path(&geometry, &state, path)) {
         describe_path(&geometry, &state, path);
-        store_bits(paths, PATH_CLASS * state.stride + path, surface_class(materials, &state, path));
+        store_bits(paths, PATH_CLASS * state.stride + path,
+                   surface_class(&geometry, materials, &state, path));
     } else {
         store_bits(paths, PATH_CLASS * state.stride + path, CLASS_ESCAPED);
     }

@@ -5,11 +5,11 @@
 // `shade` by its class. Straight-line code of scalars, so that PoCL runs it in SIMD lanes. The variant
 // SMOOTH_MEDIA serves scenes without rough transparent bodies.
 
-// Adds the light sample that `illuminate` left to what a rough boundary scatters; whether that asks for a
-// shadow ray.
+// What a rough boundary scatters of the light sample that `illuminate` left; that stays for `opaque`
+// surfaces. Whether it asks for a shadow ray.
 INLINE int light_boundary(__global const Material *materials, const State *state, uint path,
                           const Boundary *boundary, Frame frame, Vec3 wo, Vec3 geometric, Vec3 throughput,
-                          uint near, uint far) {
+                          uint near, uint far, int opaque) {
     uint stride = state->stride;
     Vec3 position = load3(state->hits + HIT_POSITION_X * stride, stride, path);
     float offset = state->hits[HIT_OFFSET * stride + path];
@@ -22,11 +22,11 @@ INLINE int light_boundary(__global const Material *materials, const State *state
     float weight = mis_weight(light_pdf, value.pdf) / light_pdf;
     Vec3 passed =
         transmittance(materials, above > 0.0f ? near : far, state->shadows[SHADOW_DISTANCE * stride + path]);
-    Vec3 arriving = load3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path);
-    arriving = times(times(times(throughput, value.f_cos), scaled(weight, arriving)), passed);
+    Vec3 light = load3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path);
+    Vec3 arriving = times(times(times(throughput, value.f_cos), scaled(weight, light)), passed);
     Vec3 origin = along(position, above > 0.0f ? offset : -offset, geometric);
     store3(state->shadows + SHADOW_ORIGIN_X * stride, stride, path, origin);
-    store3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path, arriving);
+    store3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path, choose(opaque, light, arriving));
     return lit;
 }
 
@@ -55,11 +55,6 @@ INLINE void shade_medium_path(const Params *params, __global const Material *mat
     // Opaque, or taken for opaque by chance where the material is partly transmissive.
     Uniform2 luck = uniform_2d(seed, sample, PAIR_LUCK(ray));
     int opaque = luck.v >= material->transmission;
-#ifdef LIGHT_SAMPLING
-    // `shade` knows no media: the light that its shadow ray will bring is absorbed beforehand.
-    Vec3 passed = transmittance(materials, before.entry[0], state->shadows[SHADOW_DISTANCE * stride + path]);
-    Vec3 light = load3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path);
-#endif
     float facing = -inner(geometric, direction);
     Vec3 emitted = emitted_radiance(material, facing, distance, bsdf_pdf);
     gather(state, result, choose(opaque, vec3(0.0f, 0.0f, 0.0f), times(throughput, emitted)));
@@ -96,7 +91,8 @@ INLINE void shade_medium_path(const Params *params, __global const Material *mat
 #ifdef LIGHT_SAMPLING
     // Light sampling, where the boundary has a density for it.
     int scatters = (!covered) & (!smooth) & (!opaque) & (bounces <= params->max_bounces);
-    int lit = light_boundary(materials, state, path, &boundary, frame, wo, geometric, throughput, near, far);
+    int lit = light_boundary(materials, state, path, &boundary, frame, wo, geometric, throughput, near, far,
+                             opaque);
     path_class = scatters & lit ? CLASS_SHADOW : 0u;
 #endif
     BsdfSample rough =
@@ -140,12 +136,16 @@ INLINE void shade_medium_path(const Params *params, __global const Material *mat
     state->paths[PATH_BSDF_PDF * stride + path] = opaque ? bsdf_pdf : next.pdf;
     store_bits(state->paths, PATH_COUNTS * stride + path, opaque ? counts : new_counts);
     store_bits(state->paths, PATH_CLASS * stride + path, opaque ? CLASS_SURFACE : path_class);
-#ifdef LIGHT_SAMPLING
-    // The rough boundary's light stands in these planes by now.
-    Vec3 scattered = load3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path);
-    store3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path,
-           choose(opaque, times(passed, light), scattered));
-#endif
+}
+
+// `shade` knows no media: for a path on an opaque surface inside of one, the light that its shadow ray will
+// bring is absorbed beforehand.
+INLINE void absorb_light(__global const Material *materials, const State *state, uint path) {
+    uint stride = state->stride;
+    Vec3 passed = transmittance(materials, load_medium_stack(state, path).entry[0],
+                                state->shadows[SHADOW_DISTANCE * stride + path]);
+    Vec3 light = load3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path);
+    store3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path, times(passed, light));
 }
 
 #ifndef BLOCKS
@@ -157,5 +157,9 @@ __kernel void medium_shade(const Params params, const uint count, __global const
         return;
     uint path = list[get_global_id(0)];
     shade_medium_path(&params, materials, &state, path, params.first_path + path);
+#ifdef LIGHT_SAMPLING
+    if (load_bits(paths, PATH_CLASS * state.stride + path) == CLASS_SURFACE)
+        absorb_light(materials, &state, path);
+#endif
 }
 #endif

@@ -42,11 +42,12 @@ TRACE_CALL bool trace_path(const Geometry *geometry, const State *state, uint pa
 }
 
 // Which shading kernel a path that has hit something waits for.
-INLINE uint surface_class(__global const Material *materials, const State *state, uint path) {
-    const bool in_medium = load_bits(state->paths, PATH_MEDIUM_0 * state->stride + path) != NO_INDEX;
-    const uint material = load_bits(state->hits, HIT_MATERIAL * state->stride + path);
-    const bool transmissive = materials[material].flags & MATERIAL_TRANSMISSIVE;
-    return in_medium || transmissive ? CLASS_MEDIUM : CLASS_SURFACE;
+INLINE uint surface_class(const Geometry *geometry, __global const Material *materials, const State *state,
+                          uint path) {
+    uint in_medium = load_bits(state->paths, PATH_MEDIUM_0 * state->stride + path) != NO_INDEX;
+    uint object = load_bits(state->hits, HIT_OBJECT * state->stride + path);
+    uint transmissive = materials[geometry->objects[object].material].flags & MATERIAL_TRANSMISSIVE;
+    return in_medium | transmissive ? CLASS_MEDIUM : CLASS_SURFACE;
 }
 
 // Whether anything is in the way of a path's shadow ray.

@@ -155,35 +155,98 @@ INLINE void trace_shadows(const Geometry *geometry, const Sweep *sweep, const St
 #endif
 #endif
 
-#ifdef MEDIA
-// The paths of a class, in order; returns how many.
-INLINE uint list_class(const State *state, uint path_class, uint count, __local uint *list) {
-    uint length = 0;
-    for (uint i = 0; i < count; i++) {
-        list[length] = i;
-        length += load_bits(state->paths, PATH_CLASS * BLOCK_PATHS + i) == path_class;
-    }
-    return length;
-}
-#endif
+// What the places of paths that hit something are told apart by: opaque surfaces come to stand in front.
+typedef struct {
+    __local uint *surfaces;
+    uint surface_count;
+    __local uint *media;
+    uint media_count;
+    __local float *spare; // a plane
+} Places;
 
-// Moves plane p of the paths in `list`, which is sorted, to the front.
-INLINE void move_plane(__local float *plane, __local const uint *list, uint count) {
+// Moves a plane of all these paths to the front. Places grow, so that what is read is not overwritten yet.
+INLINE void move_plane(__local float *plane, const Places *places) {
+#ifdef MEDIA
+    LANES
+    for (int i = 0; i < (int)places->media_count; i++)
+        places->spare[i] = plane[places->media[i]];
+#endif
+    LANES
+    for (int i = 0; i < (int)places->surface_count; i++)
+        plane[i] = plane[places->surfaces[i]];
+#ifdef MEDIA
+    LANES
+    for (int i = 0; i < (int)places->media_count; i++)
+        plane[places->surface_count + i] = places->spare[i];
+#endif
+}
+
+INLINE void move_paths(const State *state, const Places *places) {
+    for (uint p = RAY_DIRECTION_X; p <= RAY_DIRECTION_Z; p++)
+        move_plane(state->rays + p * BLOCK_PATHS, places);
+    for (uint p = 0; p <= PATH_COUNTS; p++)
+        move_plane(state->paths + p * BLOCK_PATHS, places);
+    move_plane(state->paths + PATH_RESULT * BLOCK_PATHS, places);
+    for (uint p = HIT_DISTANCE; p <= HIT_POSITION_Z; p++)
+        move_plane(state->hits + p * BLOCK_PATHS, places);
+    move_plane(state->hits + HIT_OBJECT * BLOCK_PATHS, places);
+    move_plane(state->hits + HIT_TRIANGLE * BLOCK_PATHS, places);
+#ifdef MEDIA
+    move_plane(state->paths + PATH_MEDIUM_0 * BLOCK_PATHS, places);
+    move_plane(state->paths + PATH_MEDIUM_1 * BLOCK_PATHS, places);
+#endif
+}
+
+#ifdef MEDIA
+// Splits the `count` paths of places->surfaces into those on opaque surfaces and those at or in media.
+INLINE void tell_apart(const Geometry *geometry, __global const Material *materials, const State *state,
+                       uint count, Places *places) {
+    __local uint *classes = (__local uint *)places->spare;
     LANES
     for (int i = 0; i < (int)count; i++)
-        plane[i] = plane[list[i]];
+        classes[i] = surface_class(geometry, materials, state, places->surfaces[i]);
+    places->surface_count = places->media_count = 0;
+    for (uint i = 0; i < count; i++) {
+        uint path = places->surfaces[i];
+        uint opaque = classes[i] == CLASS_SURFACE;
+        places->surfaces[places->surface_count] = path;
+        places->media[places->media_count] = path;
+        places->surface_count += opaque;
+        places->media_count += !opaque;
+    }
 }
 
-INLINE void move_paths(const State *state, __local const uint *list, uint count) {
-    for (uint p = RAY_DIRECTION_X; p <= RAY_DIRECTION_Z; p++)
-        move_plane(state->rays + p * BLOCK_PATHS, list, count);
-    for (uint p = 0; p < PATH_CLASS; p++)
-        move_plane(state->paths + p * BLOCK_PATHS, list, count);
-    for (uint p = HIT_DISTANCE; p <= HIT_POSITION_Z; p++)
-        move_plane(state->hits + p * BLOCK_PATHS, list, count);
-    move_plane(state->hits + HIT_OBJECT * BLOCK_PATHS, list, count);
-    move_plane(state->hits + HIT_TRIANGLE * BLOCK_PATHS, list, count);
+// Media shade their paths from place `first` on. Those that stand on an opaque surface after all, by chance,
+// are shaded as such.
+INLINE void shade_media(const Params *params, const Emitters *emitters, __global const float *layers,
+                        const State *state, uint first, uint count, __local const uint *results,
+                        __local uint *list) {
+#if defined(LIGHT_SAMPLING) && !defined(SMOOTH_MEDIA)
+    LANES
+    for (int i = first; i < (int)count; i++)
+        illuminate_path(params, emitters, state, i);
+#endif
+    LANES
+    for (int i = first; i < (int)count; i++)
+        shade_medium_path(params, emitters->materials, state, i, results[i]);
+    uint opaque = 0;
+    for (uint i = first; i < count; i++) {
+        list[opaque] = i;
+        opaque += load_bits(state->paths, PATH_CLASS * BLOCK_PATHS + i) == CLASS_SURFACE;
+    }
+#ifdef LIGHT_SAMPLING
+    LANES
+    for (int i = 0; i < (int)opaque; i++)
+        illuminate_path(params, emitters, state, list[i]);
+    LANES
+    for (int i = 0; i < (int)opaque; i++)
+        absorb_light(emitters->materials, state, list[i]);
+#endif
+    LANES
+    for (int i = 0; i < (int)opaque; i++)
+        shade_path(params, emitters->materials, layers, state, list[i], results[list[i]]);
 }
+#endif
 
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
 trace_blocks(const Params params, __global const Slot *slots, __global const Node *top_nodes,
@@ -220,7 +283,11 @@ trace_blocks(const Params params, __global const Slot *slots, __global const Nod
             for (int i = 0; i < (int)escaped_count; i++)
                 escape_path(&params, &emitters, &state, escaped[i], results[escaped[i]]);
         }
-        move_paths(&state, list, count);
+        Places places = {list, count, escaped, 0, swept};
+#ifdef MEDIA
+        tell_apart(&geometry, materials, &state, count, &places);
+#endif
+        move_paths(&state, &places);
         LANES
         for (int i = 0; i < (int)count; i++)
             describe_path(&geometry, &state, i);
@@ -234,34 +301,18 @@ trace_blocks(const Params params, __global const Slot *slots, __global const Nod
             break;
         }
 #endif
+        const uint surfaces = places.surface_count;
+#ifdef MEDIA
+        shade_media(&params, &emitters, layers, &state, surfaces, count, results, list);
+#endif
 #ifdef LIGHT_SAMPLING
         LANES
-        for (int i = 0; i < (int)count; i++)
+        for (int i = 0; i < (int)surfaces; i++)
             illuminate_path(&params, &emitters, &state, i);
 #endif
-#ifdef MEDIA
-        LANES
-        for (int i = 0; i < (int)count; i++)
-            store_bits(paths, PATH_CLASS * BLOCK_PATHS + i, surface_class(materials, &state, i));
-        __local uint *media_list = escaped; // which have had their end
-        uint surfaces = list_class(&state, CLASS_SURFACE, count, list);
-        uint media = list_class(&state, CLASS_MEDIUM, count, media_list);
-        LANES
-        for (int i = 0; i < (int)media; i++)
-            shade_medium_path(&params, materials, &state, media_list[i], results[media_list[i]]);
-        // Those that stand on an opaque surface after all.
-        for (uint i = 0; i < media; i++) {
-            list[surfaces] = media_list[i];
-            surfaces += load_bits(paths, PATH_CLASS * BLOCK_PATHS + media_list[i]) == CLASS_SURFACE;
-        }
         LANES
         for (int i = 0; i < (int)surfaces; i++)
-            shade_path(&params, materials, layers, &state, list[i], results[list[i]]);
-#else
-        LANES
-        for (int i = 0; i < (int)count; i++)
             shade_path(&params, materials, layers, &state, i, results[i]);
-#endif
 #ifdef LIGHT_SAMPLING
         trace_shadows(&geometry, &sweep, &state, count, results, by_axis);
 #endif
