@@ -8,6 +8,7 @@ camera travels with the parameters of every launch.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -24,6 +25,36 @@ _MOST_FACES_ON_TOP = 512
 _FEW_PACKS = 16
 _MOST_FACES_IN_ALL_ON_TOP = 4096
 """Of one object, and of all, that stand in the top level themselves."""
+
+
+@dataclass(frozen=True, eq=False)
+class _ObjectTable:
+    """What the device knows of each object, kept so that an edit of one among thousands describes that one.
+
+    rows     (N,) layout.OBJECT.
+    bounds   (N, 2, 3) in world space.
+    on_top   (N,) whether its triangles are part of the top level.
+    """
+
+    objects: tuple[Object, ...]
+    rows: npt.NDArray[np.void]
+    bounds: npt.NDArray[np.float64]
+    on_top: npt.NDArray[np.bool_]
+
+    def follow(self, objects: tuple[Object, ...], on_top: Sequence[int]) -> _ObjectTable:
+        """The table of other objects; those that are the same are not described again."""
+        is_on_top = np.zeros(len(objects), np.bool_)
+        is_on_top[on_top] = True
+        known = {id(obj): i for i, obj in enumerate(self.objects)}
+        source = np.array([known.get(id(obj), -1) for obj in objects], np.int64)
+        same = source >= 0
+        same[same] = self.on_top[source[same]] == is_on_top[same]
+        rows, bounds = np.zeros(len(objects), layout.OBJECT), np.zeros((len(objects), 2, 3))
+        rows[same], bounds[same] = self.rows[source[same]], self.bounds[source[same]]
+        for i in np.flatnonzero(~same):
+            _describe(objects[i], is_on_top[i], rows[i])
+            bounds[i] = objects[i].world_bounds
+        return _ObjectTable(objects, rows, bounds, is_on_top)
 
 
 class DeviceScene:
@@ -43,6 +74,9 @@ class DeviceScene:
         self._light_scale = 0.0
         self._trees: WeakKeyDictionary[Mesh, bvh.Bvh] = WeakKeyDictionary()
         self._places: dict[Mesh, tuple[int, int, int]] = {}
+        self._objects = _ObjectTable(
+            (), np.zeros(0, layout.OBJECT), np.zeros((0, 2, 3)), np.zeros(0, np.bool_)
+        )
         self._buffers: dict[str, cl.Buffer] = {}
         self._environment: lights.EnvironmentTable | None = None
         self._rebuild(scene, [name for name, _ in _PARTS])
@@ -134,37 +168,23 @@ class DeviceScene:
 
     def _build_objects(self) -> None:
         objects = self.scene.objects
-        index = {name: i for i, name in enumerate(self.scene.materials)}
         on_top = _objects_on_top(objects)
-        vertices = {
-            i: transform.apply_affine(
-                objects[i].world_from_object, objects[i].mesh.vertices.astype(np.float64)
-            ).astype(np.float32)
-            for i in on_top
-        }
-        rows = np.zeros(len(objects), layout.OBJECT)
-        for i, (row, obj) in enumerate(zip(rows, objects, strict=True)):
-            matrix = obj.world_from_object
-            row["world_from_object"] = matrix.ravel()
-            inverse = transform.invert_affine(matrix)
-            row["object_from_world"] = inverse.ravel()
-            if i in vertices:
-                bounds = np.stack([vertices[i].min(axis=0), vertices[i].max(axis=0)])
-                row["position_error"] = bvh.position_error(bounds, _NOT_MOVED, _NOT_MOVED)
-            else:
-                row["position_error"] = bvh.position_error(obj.mesh.bounds, matrix, inverse)
-            row["first_node"], row["first_pack"], row["first_normal"] = self._places[obj.mesh]
-            row["material"] = index[obj.material]
-            row["visible"] = obj.visible
-            row["winding"] = np.sign(np.linalg.det(matrix[:, :3]))
+        table = self._objects.follow(objects, on_top)
+        index = {name: i for i, name in enumerate(self.scene.materials)}
+        rows = table.rows
+        rows["material"] = [index[obj.material] for obj in objects]
+        if objects:
+            places = np.array([self._places[obj.mesh] for obj in objects], np.uint32)
+            rows["first_node"], rows["first_pack"], rows["first_normal"] = places.T
         self._upload("objects", rows)
-        self._build_top(vertices)
+        self._objects = table
+        self._build_top({i: _world_vertices(objects[i]) for i in on_top})
 
     def _build_top(self, vertices: dict[int, npt.NDArray[np.float32]]) -> None:
         """The top level; `vertices`: in world space, those of the objects whose triangles are part of it."""
         objects = self.scene.objects
         others = np.array([i for i in range(len(objects)) if i not in vertices], np.int64)
-        bounds = np.array([objects[i].world_bounds for i in others]).reshape(-1, 2, 3)
+        bounds = self._objects.bounds[others]
         triangles = None
         if vertices:
             firsts = np.cumsum([0, *(len(v) for v in vertices.values())])
@@ -241,6 +261,26 @@ class DeviceScene:
         self._smooth_media = all(material.roughness**2 <= layout.MIN_ALPHA for material in media)
         self._upload("materials", rows)
         self._upload("layers", layers)
+
+
+def _describe(obj: Object, on_top: bool, row: npt.NDArray[np.void]) -> None:
+    """Fill a row of the table of objects with what depends on the object alone."""
+    matrix = obj.world_from_object
+    inverse = transform.invert_affine(matrix)
+    row["world_from_object"], row["object_from_world"] = matrix.ravel(), inverse.ravel()
+    if on_top:
+        vertices = _world_vertices(obj)
+        bounds = np.stack([vertices.min(axis=0), vertices.max(axis=0)])
+        row["position_error"] = bvh.position_error(bounds, _NOT_MOVED, _NOT_MOVED)
+    else:
+        row["position_error"] = bvh.position_error(obj.mesh.bounds, matrix, inverse)
+    row["visible"] = obj.visible
+    row["winding"] = np.sign(np.linalg.det(matrix[:, :3]))
+
+
+def _world_vertices(obj: Object) -> npt.NDArray[np.float32]:
+    vertices = obj.mesh.vertices.astype(np.float64)
+    return transform.apply_affine(obj.world_from_object, vertices).astype(np.float32)
 
 
 def _shape_changed(change: Change) -> bool:

@@ -40,16 +40,17 @@ def triangle_lights(scene: Scene, share: float) -> TriangleLights:
     """Every visible emissive triangle that has an area. `share` is the chance that light sampling turns to
     triangles at all; the densities contain it."""
     corners, emission, weights, double_sided = [], [], [], []
+    radiant = {name: radiant_weight(material) for name, material in scene.materials.items()}
     for obj in scene.objects:
-        material = scene.materials[obj.material]
-        if not obj.visible or radiant_weight(material) == 0:
+        if not obj.visible or radiant[obj.material] == 0:
             continue
+        material = scene.materials[obj.material]
         # A mirrored face keeps its outside: two corners change places to keep it on the normal's side.
         mirrored = np.linalg.det(obj.world_from_object[:, :3]) < 0
         faces = obj.mesh.faces[:, [0, 2, 1]] if mirrored else obj.mesh.faces
         corners.append(transform.apply_affine(obj.world_from_object, obj.mesh.vertices)[faces])
         emission.append(np.broadcast_to(material.emission, (len(faces), 3)))
-        weights.append(np.full(len(faces), radiant_weight(material)))
+        weights.append(np.full(len(faces), radiant[obj.material]))
         double_sided.append(np.full(len(faces), material.double_sided))
     if not corners:
         return TriangleLights(np.zeros((len(layout.LightPlane), 0), np.float32), 0.0)

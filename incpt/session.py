@@ -465,14 +465,14 @@ def _slot_count(settings: RenderSettings) -> int:
 def affected_objects(old: Scene, new: Scene, change: Change) -> list[Object]:
     """The objects that look different, as they were and as they are; hidden ones do not count, nor does one
     that is there as before under another name, its own or its material's."""
-    gone = [o for o in old.objects if o.visible and _is_in(o, change, change.added)]
-    come = [o for o in new.objects if o.visible and _is_in(o, change, change.removed)]
+    gone = _touched(old, change.objects - change.added, change.materials)
+    come = _touched(new, change.objects - change.removed, change.materials)
     same = Counter(_look(old, o) for o in gone) & Counter(_look(new, o) for o in come)
     return [*_without(old, gone, same), *_without(new, come, same)]
 
 
-def _is_in(obj: Object, change: Change, but: frozenset[str]) -> bool:
-    return obj.name in change.objects - but or obj.material in change.materials
+def _touched(scene: Scene, names: frozenset[str], materials: frozenset[str]) -> list[Object]:
+    return [o for o in scene.objects if o.visible and (o.name in names or o.material in materials)]
 
 
 def _look(scene: Scene, obj: Object) -> tuple[object, ...]:
