@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import typer
 
-from incpt.benchmarks import build, latency, rays, report, scale, soak, sweep, table51
+from incpt.benchmarks import build, latency, rays, report, scale, screenshots, soak, sweep, table51
 from incpt.benchmarks.peers import compare
 from incpt.errors import InputError
 
@@ -27,6 +27,7 @@ app.command("build")(build.build)
 app.command("scale")(scale.scale)
 app.command("latency")(latency.latency)
 app.command("soak")(soak.soak)
+app.command("screenshots")(screenshots.screenshots)
 app.command("report")(report.report)
 
 

@@ -125,7 +125,7 @@ def draw_editor(hand: Hand, spp: int) -> Pixels:
     start = x + 30, y + 27
     with hand.pressed(start):
         for step in range(1, 7):
-            hand.move((start[0] - 8 * step, start[1]))
+            hand.move((start[0] - 4 * step, start[1]))
         hand.pump(lambda: _is_incremental(hand) and _queue_done(hand) >= 420, timeout=3600)
         pixels = hand.screenshot()
     hand.key("ctrl+z")
