@@ -247,6 +247,16 @@ INLINE bool bvh_keep(uint pack, uint lanes, const float8 distance, const float8 
     return true;
 }
 
+// Asks for a node or pack before it is needed: those of a large mesh lie in memory that is slow to answer.
+INLINE void bvh_prefetch(__global const Node *nodes, __global const TrianglePack *packs, uint reference) {
+#ifdef INCPT_POCL
+    const size_t place =
+        reference & NODE_LEAF ? (size_t)(packs + (reference & ~NODE_LEAF)) : (size_t)(nodes + reference);
+    for (uint line = 0; line < 5; line++)
+        __builtin_prefetch((const void *)(place + 64 * line));
+#endif
+}
+
 // Nearest triangle of a mesh before hit->distance; any one of them if `any`, which fills nothing in.
 INLINE bool bvh_trace_mesh(const BvhRay *ray, __global const Node *nodes, __global const TrianglePack *packs,
                            const bool any, BvhHit *hit) {
@@ -260,6 +270,9 @@ INLINE bool bvh_trace_mesh(const BvhRay *ray, __global const Node *nodes, __glob
             const uint lanes = bvh_boxes(ray, node, hit->distance, &distance);
             if (lanes) {
                 reference = bvh_push(node, lanes, distance, stack, &height);
+                bvh_prefetch(nodes, packs, reference);
+                if (height > 0)
+                    bvh_prefetch(nodes, packs, (uint)stack[height - 1]);
                 continue;
             }
         } else {

@@ -78,14 +78,14 @@ INLINE uint trace_rays(const Geometry *geometry, const Sweep *sweep, const State
         LANES
         for (int i = 0; i < (int)counts[axis]; i++)
             keep_swept(sweep, state, i, sorted[i]);
+#ifndef ALL_ON_TOP
+        for (uint i = 0; i < counts[axis]; i++)
+            trace_path(geometry, state, sorted[i]);
+#endif
     }
     uint hit_count = 0, missed = 0;
     for (uint i = 0; i < count; i++) {
         uint live = load_bits(state->paths, PATH_CLASS * BLOCK_PATHS + i) & CLASS_LIVE;
-#ifndef ALL_ON_TOP
-        if (live)
-            trace_path(geometry, state, i);
-#endif
         uint hit = load_bits(state->hits, HIT_OBJECT * BLOCK_PATHS + i) != NO_INDEX;
         list[hit_count] = i;
         escaped[missed] = i;
