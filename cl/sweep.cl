@@ -8,6 +8,13 @@
 // The triangle test is that of bvh.cl. Its axes depend on the largest component of the direction, so that
 // rays are sorted by it; then they are the same for all lanes.
 
+// LLVM 14 keeps to registers of 256 bits unless it is told that the code needs wider ones.
+#ifdef __AVX512F__
+#define WIDE __attribute__((min_vector_width(512)))
+#else
+#define WIDE
+#endif
+
 #define SWEEP_WIDTH 16
 
 // Planes of rays that are ready for the test, in its axes, and of what it finds.
@@ -66,7 +73,7 @@ INLINE int16 sweep_box(__global const float *bounds, const uint *axes, const flo
 
 // Tests sixteen rays, from place `first` on, against all triangles; `axis` is the largest of their
 // directions.
-INLINE void sweep_rays(const Sweep *sweep, uint first, uint axis) {
+static __attribute__((noinline)) WIDE void sweep_rays(const Sweep *sweep, uint first, uint axis) {
     __local float *planes = sweep->planes + first;
     const uint x = axis == 2 ? 0 : axis + 1, y = axis == 0 ? 2 : axis - 1;
     const uint axes[3] = {x, y, axis};

@@ -25,13 +25,6 @@
 #define LANES
 #endif
 
-// LLVM 14 keeps to registers of 256 bits unless it is told that the code needs wider ones.
-#ifdef __AVX512F__
-#define WIDE __attribute__((min_vector_width(512)))
-#else
-#define WIDE
-#endif
-
 // Traces the rays of the `count` live paths; returns how many hit something. Their places come to stand in
 // `list`, the places of those that left the scene in `escaped`.
 #ifdef FEW_ON_TOP
