@@ -44,7 +44,9 @@ def context() -> Iterator[Any]:
         if os.environ.get("CI"):
             raise
         pytest.skip(f"no offscreen OpenGL context can be made here: {error}")
-    yield made
+    # Left current it would keep a window's context, in another test, from becoming so.
+    with made:
+        yield made
     made.release()
 
 
