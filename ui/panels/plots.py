@@ -67,7 +67,9 @@ def draw(records: Records, step_ms: float) -> None:
     if not records.errors:
         imgui.text_disabled("Pin a reference (F9) to plot the error.")
         return
-    if implot.begin_plot("Error##plot", imgui.ImVec2(-1, height * 1.2), flags):
+    if implot.begin_plot("Error##plot", imgui.ImVec2(-1, height * 1.6), flags):
+        # Errors fall: there is room at the upper right.
+        implot.setup_legend(implot.Location_.north_east)
         implot.setup_axes("seconds", "RMSE", implot.AxisFlags_.auto_fit, implot.AxisFlags_.auto_fit)
         implot.setup_axis_scale(implot.ImAxis_.y1, implot.Scale_.log10)
         for name, series in records.errors.items():
