@@ -32,7 +32,8 @@ Pixels = npt.NDArray[np.uint8]
 WINDOW = (1280, 760)
 """Beside the panels there is room for the picture pixel by pixel."""
 SIZE = (960, 540)
-NOR = 96
+NOR = 64
+FEW_SPP = 24
 OBJECT = "red cube"
 _GAP_PX, _CAPTION_PX, _TEXT_PX = 8, 30, 15
 _CELL_WIDTH_PX = 640
@@ -149,7 +150,8 @@ def draw_split(hand: Hand, spp: int) -> Pixels:
     hand.drag((bar, middle), (hand.in_picture(0.452, 0.5)[0], middle))
     turn_cube(hand)
     hand.key("Escape")
-    stop_after(hand, 420)
+    hand.show_tab("Render")
+    stop_after(hand, 340)
     pixels = hand.screenshot()
     hand.key("F6")
     return pixels
@@ -165,7 +167,7 @@ def draw_modes(hand: Hand, spp: int) -> Pixels:
     cells.append((picture(hand), f"2. Refine: {spp} samples per pixel"))
     turn_cube(hand)
     hand.key("Escape")
-    stop_after(hand, 330)
+    stop_after(hand, 72)
     cells.append((picture(hand), "3. Incremental: the edit, from its middle outwards"))
     refine(hand, spp)
     cells.append((picture(hand), "4. Refine: all of it shows the edit"))
@@ -181,7 +183,7 @@ def draw_overlays(hand: Hand, spp: int) -> Pixels:
     cells = []
     for overlay, caption in (
         ("Order of the queue", "Order of the queue: a spiral around the edit"),
-        ("Samples per pixel", "Samples per pixel: what is replaced has all of them"),
+        ("Samples per pixel", f"Samples per pixel: {FEW_SPP} before the edit, {NOR} where it has come"),
         ("Object ids", "Object ids"),
         ("Normals", "Normals"),
     ):
@@ -195,19 +197,26 @@ def draw_overlays(hand: Hand, spp: int) -> Pixels:
 
 
 def draw_method(hand: Hand, spp: int) -> Pixels:
-    """The panel of the method, with the error against a pinned picture."""
+    """The panel of the method: the error of an edit under both strategies, against a pinned picture of it."""
     editor = hand.app.editor
-    hand.show_tab("Method")
-    hand.click("Tile grid")
-    hand.click("Pin this picture")
-    hand.click(f"object {OBJECT}")
-    hand.show_tab("Object")
-    editor.target_spp = None
-    hand.type_into("Rotation Y", "60")
+    turn_cube(hand)
+    refine(hand, spp)
+    hand.key("F9")
+    hand.key("ctrl+z")
+    hand.key("ctrl+z")
+    hand.key("Escape")
+    hand.key("F6")
+    hand.pump(lambda: editor.frame is not None and len(editor.frame.pictures) == 2, timeout=60)
+    refine(hand, spp)
     hand.show_tab("Method")
     hand.click("Overlay")
     hand.click("Overlay: Replaced tiles")
-    hand.pump(lambda: _is_incremental(hand) and _queue_done(hand) >= 500, timeout=3600)
+    hand.click("Display")
+    editor.paused = True
+    hand.key("ctrl+shift+z")
+    hand.key("ctrl+shift+z")
+    hand.key("Escape")
+    stop_after(hand, 600)
     return hand.screenshot()
 
 
@@ -261,6 +270,6 @@ def screenshots(
     names = options.chosen("--only", only, list(PICTURES))
     output.mkdir(parents=True, exist_ok=True)
     for name in names:
-        with opened(1 if name == "modes" else spp) as hand:
+        with opened(min({"modes": 1, "overlays": FEW_SPP}.get(name, spp), spp)) as hand:
             write(output / f"{name}.png", PICTURES[name](hand, spp))
         print(output / f"{name}.png")
