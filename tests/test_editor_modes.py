@@ -225,7 +225,7 @@ AFTER: dict[str, tuple[Callable[[Desk], object], Mode]] = {
     "step time": (typed("Render", "Step time", "30"), REFINE),
     "NoR": (typed("Render", "NoR", "64"), REFINE),
     "NoR in a drag": (typed("Render", "NoR in a drag", "2"), REFINE),
-    "strategy": (chosen("Render", "Strategy", "Restart: everything anew"), REFINE),
+    "strategy": (chosen("Render", "Strategy", "Restart"), REFINE),
     "navigation": (command("Plain"), REFINE),
     "help": (command("Keys and mouse"), REFINE),
     "split view": (command("Split view"), REFINE),

@@ -154,8 +154,12 @@ def choice(label: str, value: str, options: Sequence[tuple[str, str]], tip: str 
     """One of `options`, given as (value, text)."""
     texts = dict(options)
     with row(label, tip) as field:
-        is_open = imgui.begin_combo(field, texts.get(value, value))
+        shown = texts.get(value, value)
+        is_open = imgui.begin_combo(field, shown)
         places.note(label)
+        arrow = imgui.get_frame_height() + imgui.get_style().frame_padding.x
+        if imgui.calc_text_size(shown).x > imgui.get_item_rect_size().x - arrow:
+            imgui.set_item_tooltip(shown)
         if is_open:
             for option, text in options:
                 chosen = imgui.selectable(text, option == value)[0]

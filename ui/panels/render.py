@@ -19,7 +19,8 @@ MODE_TEXTS = {
     Mode.REFINE: "Refine: more samples everywhere",
     Mode.INCREMENTAL: "Incremental: what the edit affects first",
 }
-STRATEGY_TEXTS = {"restart": "Restart: everything anew", "spiral": "Spiral: from the edit outwards"}
+STRATEGY_TEXTS = {"restart": "Restart", "spiral": "Spiral"}
+_STRATEGY_TIP = "Restart: an edit starts everything anew. Spiral: from the edit outwards, the rest is kept"
 _TILE_SIZES = (8, 16, 32, 64, 128)
 
 
@@ -40,7 +41,7 @@ def draw_state(frame: Frame | None) -> None:
         imgui.text_disabled("No picture yet")
         return
     picture = frame.pictures[-1]
-    _draw_progress(picture, frame.resting)
+    _draw_progress(picture, _resting_text(frame))
     least, mean = int(picture.tile_spp.min()), float(picture.tile_spp.mean())
     widgets.value_row("Samples", f"{least:,} least, {mean:,.1f} mean", "Per pixel")
     height, width = picture.image.shape[:2]
@@ -51,9 +52,14 @@ def draw_state(frame: Frame | None) -> None:
         widgets.value_row("Not finite", f"{frame.nonfinite:,} samples", "They count as black")
 
 
-def _draw_progress(picture: Picture, is_resting: bool) -> None:
-    mode = "At rest" if is_resting else MODE_TEXTS[picture.mode]
-    imgui.text_unformatted(mode)
+def _resting_text(frame: Frame) -> str | None:
+    if not frame.resting:
+        return None
+    return "Paused" if frame.view.paused else "At rest: the target is reached"
+
+
+def _draw_progress(picture: Picture, resting: str | None) -> None:
+    imgui.text_unformatted(resting or MODE_TEXTS[picture.mode])
     places.note("mode")
     done, total = picture.queue_done, len(picture.queue)
     imgui.progress_bar(done / max(total, 1), imgui.ImVec2(-1, 0), f"{done:,} of {total:,} tiles")
@@ -98,7 +104,8 @@ def draw_control(control: Control) -> tuple[Control, bool]:
 def draw_settings(settings: RenderSettings, refusals: Refusals) -> RenderSettings:
     """The scene's render settings; returns them after this frame."""
     strategies = [(name, STRATEGY_TEXTS.get(name, name)) for name in STRATEGIES]
-    settings = _set(settings, refusals, strategy=widgets.choice("Strategy", settings.strategy, strategies))
+    strategy = widgets.choice("Strategy", settings.strategy, strategies, _STRATEGY_TIP)
+    settings = _set(settings, refusals, strategy=strategy)
     sizes = [(str(size), f"{size} × {size}") for size in sorted({*_TILE_SIZES, settings.tile_size})]
     tile_size = int(widgets.choice("Tile size", str(settings.tile_size), sizes, "Pixels"))
     settings = _set(settings, refusals, tile_size=tile_size)
