@@ -79,18 +79,21 @@ class Live:
         """That of the chosen strategy; to look at."""
         return self._main.session
 
-    def advance(self, view: View) -> Frame | None:
+    def advance(self, view: View, has_edit_after: Callable[[], bool] = lambda: False) -> Frame | None:
         """Do one bounded piece of work towards `view` and return what there is to show; None: nothing to do,
-        and nothing new.
+        and nothing new. `has_edit_after` tells whether another scene waits: then one more picture of this
+        one, which has been answered, is not worth the time to read it.
 
         What an edit or a setting raises (InputError, DeviceError, MemoryError) comes through once for a view;
         the last good one is rendered on. RenderingStoppedError: a step failed, nothing can go on.
         """
         self._follow(view)
         try:
-            side = self._next_side()
+            side, had_answer = self._next_side(), self._main.answered
             if side is not None:
                 self._step(side)
+                if had_answer and has_edit_after():
+                    return None
             elif self._rest_is_shown:
                 return None
             has_aovs = not self._view.aovs or ((self._main.answered or side is None) and self._update_aovs())

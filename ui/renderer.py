@@ -13,6 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -223,6 +224,10 @@ class ThreadedRenderer:
             self._requests.clear()
         return requests
 
+    def _has_edit_after(self, view: View) -> bool:
+        latest = self._view
+        return latest is not None and latest.scene is not view.scene
+
     def _run(self) -> None:
         try:
             self._loop()
@@ -250,7 +255,7 @@ class ThreadedRenderer:
                 self._answer(live, request)
             view = self._view
             try:
-                frame = live.advance(view)
+                frame = live.advance(view, partial(self._has_edit_after, view))
             except RenderingStoppedError:
                 raise
             except (InputError, DeviceError, MemoryError) as error:
