@@ -242,6 +242,10 @@ def _quiet() -> Iterator[None]:
                 os.dup2(null, number)
             yield
         finally:
+            # Its threads may still be at work, and print, after one of them has raised an error.
+            threads = OpenEXR.global_thread_count()
+            OpenEXR.set_global_thread_count(0)
+            OpenEXR.set_global_thread_count(threads)
             for number, copy in saved:
                 os.dup2(copy, number)
                 os.close(copy)
