@@ -16,11 +16,13 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.resources import as_file, files
-from typing import TYPE_CHECKING, Any
+from multiprocessing import get_context
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich.table import Table
 
@@ -35,6 +37,8 @@ from incpt.device import Device
 
 if TYPE_CHECKING:
     from incpt.ui.app import App
+
+T = TypeVar("T")
 
 NAME = "latency"
 SCREEN = (1440, 900)
@@ -118,16 +122,26 @@ def _has_samples(app: App, count: int) -> bool:
 # ------------------------------------------------------------------------------------------------ edits
 
 
+def _alone(function: Callable[..., T], *arguments: object) -> T:
+    """What the function returns in a process of its own. Threads of a device that is open already would have
+    the priority of those that opened it, and not that of the editor's renderer."""
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        return pool.submit(function, *arguments).result()
+
+
 def _edits(plan: Plan, work: Work) -> Outcome:
-    """Single steps of a drag of a field, with a rest between them."""
-    rows = []
+    work.timing_starts()
+    return Outcome({"what": WHAT[EDIT]}, [{"ms": 1e3 * seconds} for seconds in _alone(edit_seconds, plan)])
+
+
+def edit_seconds(plan: Plan) -> list[float]:
+    """Single steps of a drag of a field, with a rest between them: seconds until each was answered."""
+    found = []
     with desktop(plan) as hand, _held(hand, "Position X") as (pointer, place):
-        work.timing_starts()
         for i in range(plan.edits):
             _idle(hand.app, REST_SECONDS + 0.05 * (i % 4))
-            work.check(i / plan.edits)
-            rows.append({"ms": 1e3 * _answer_seconds(hand.app, pointer, (place[0] + 4 * (i + 1), place[1]))})
-    return Outcome({"what": WHAT[EDIT]}, rows)
+            found.append(_answer_seconds(hand.app, pointer, (place[0] + 4 * (i + 1), place[1])))
+    return found
 
 
 @contextmanager
@@ -172,21 +186,25 @@ def _idle(app: App, seconds: float) -> None:
 
 
 def _sweep(kind: str, plan: Plan, work: Work) -> Outcome:
+    work.timing_starts()
+    return Outcome(_alone(sweep, kind, plan))
+
+
+def sweep(kind: str, plan: Plan) -> dict[str, float]:
     """The mouse moves all the time; counted are pictures of new scenes on the screen."""
     with desktop(plan) as hand:
         if kind == DRAG:
             with _held(hand, "Rotation Y") as (_, place):
-                return _counted(hand, work, lambda i: (place[0] + i % 200 - 100, place[1]))
+                return _counted(hand, lambda i: (place[0] + i % 200 - 100, place[1]))
         start = hand.in_picture(0.5, 0.5)
         with hand.pressed(start, button=2):
-            return _counted(hand, work, lambda i: (start[0] + 2 * (i % 250), start[1] + (i % 250) / 5))
+            return _counted(hand, lambda i: (start[0] + 2 * (i % 250), start[1] + (i % 250) / 5))
 
 
-def _counted(hand: Hand, work: Work, place: Callable[[int], tuple[float, float]]) -> Outcome:
+def _counted(hand: Hand, place: Callable[[int], tuple[float, float]]) -> dict[str, float]:
     """Pictures of new scenes that come to the screen while a thread moves the pointer."""
     app, stop = hand.app, threading.Event()
     mover = threading.Thread(target=_keep_moving, args=(place, stop), daemon=True)
-    work.timing_starts()
     mover.start()
     times, frames, shown = [], 0, None
     end = time.perf_counter() + SWEEP_SECONDS
@@ -201,14 +219,11 @@ def _counted(hand: Hand, work: Work, place: Callable[[int], tuple[float, float]]
     stop.set()
     mover.join()
     gaps = [later - earlier for earlier, later in itertools.pairwise(times)]
-    load = work.load()
-    hand.pump(frames=2)
-    values = {
+    return {
         "pictures_per_second": len(gaps) / (times[-1] - times[0]),
         "worst_gap_ms": 1e3 * max(gaps),
         "frames_per_second": frames / SWEEP_SECONDS,
     }
-    return Outcome(values, load=load)
 
 
 def _keep_moving(place: Callable[[int], tuple[float, float]], stop: threading.Event) -> None:
