@@ -174,3 +174,28 @@ def test_null_renderer_records_and_answers() -> None:
     assert renderer.poll() == [] and len(renderer.views) == 1 and len(renderer.requests) == 2
     renderer.close()
     assert renderer.closed
+
+
+def test_the_window_draws_before_a_drag_goes_on(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not device.is_cpu:
+        pytest.skip("only a device that is the processor is in the window's way")
+    monkeypatch.setattr("incpt.ui.renderer.DRAWING_SECONDS", PATIENCE)
+    renderer = ThreadedRenderer(device)
+    try:
+        scene = mixed_scene(nor=4)
+        renderer.show(View(scene, step_ms=2))
+        wait_for(renderer, Frame, lambda frame: frame.pictures[0].tile_spp.min() >= 2)
+        edited = moved(scene)
+
+        def answers(frame: Frame) -> bool:
+            return frame.view.scene is edited and bool(frame.pictures[0].replaced.any())
+
+        renderer.show(View(edited, before=scene, step_ms=2))
+        wait_for(renderer, Frame, answers)
+        time.sleep(0.3)
+        assert renderer.poll() == []
+        # The next edit, and the end of the drag, are not kept waiting.
+        renderer.show(View(scene, before=scene, step_ms=2))
+        wait_for(renderer, Frame, lambda frame: frame.view.scene is scene)
+    finally:
+        renderer.close()

@@ -20,9 +20,12 @@ from typing import Protocol
 from incpt.device import Device
 from incpt.errors import DeviceError, InputError, OutputError, one_line
 from incpt.live import Frame, Live, RenderingStoppedError, View
+from incpt.scene import Scene
 
 _NICER = 5
 
+DRAWING_SECONDS = 0.025
+"""The longest that a drag's next step waits for the window to draw the last one."""
 FIGURES_SECONDS = 0.1
 """Between two Frames with the same picture; a window redraws for each."""
 
@@ -160,6 +163,7 @@ class ThreadedRenderer:
         self._closing = False
         self._images: tuple[object, ...] = ()
         self._posted_at = 0.0
+        self._drawn: Scene | None = None
         self._thread = threading.Thread(target=self._run, name="renderer", daemon=True)
         self._thread.start()
 
@@ -265,6 +269,20 @@ class ThreadedRenderer:
                 self._wait_for_news(view)
             elif self._is_worth_showing(frame):
                 self._post(frame)
+                if live.device.is_cpu:
+                    self._let_draw(frame)
+
+    def _let_draw(self, frame: Frame) -> None:
+        """In a drag, leave the processor to the window while it draws the first picture of an edit: on
+        software OpenGL a frame takes twice as long beside rendering. The next edit ends it."""
+        view, picture = frame.view, frame.pictures[-1]
+        if view.before is None or view.scene is self._drawn or not picture.replaced.any():
+            return
+        self._drawn = view.scene
+        with self._condition:
+            self._condition.wait_for(
+                lambda: self._closing or bool(self._requests) or self._has_edit_after(view), DRAWING_SECONDS
+            )
 
     def _answer(self, live: Live, request: Request) -> None:
         try:
