@@ -25,8 +25,6 @@
 #define LANES
 #endif
 
-// Traces the rays of the `count` live paths; returns how many hit something. Their places come to stand in
-// `list`, the places of those that left the scene in `escaped`.
 #ifdef FEW_ON_TOP
 // Sorts the paths whose class has a bit by the largest component of their ray; `by_axis` has a row for each.
 INLINE void sort_by_axis(const State *state, __local const float *rays, uint wanted, uint count,
@@ -55,6 +53,8 @@ INLINE void keep_swept(const Sweep *sweep, const State *state, uint place, uint 
            load3(planes + SWEEP_WEIGHT * BLOCK_PATHS, BLOCK_PATHS, 0));
 }
 
+// Traces the rays of the `count` live paths; returns how many hit something. Their places come to stand in
+// `list`, the places of those that left the scene in `escaped`.
 INLINE uint trace_rays(const Geometry *geometry, const Sweep *sweep, const State *state, uint count,
                        __local uint *list, __local uint *escaped, __local uint *by_axis,
                        uint *escaped_count) {

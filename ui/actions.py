@@ -18,10 +18,10 @@ from incpt.ui.recovery import Recovery, find_left_behind
 from incpt.ui.renderer import Export, Pin
 from incpt.ui.selection import Selection
 
-SCENE_FILES = ("Scenes", (".toml",))
+SCENE_FILES = ("Scenes", objects.SCENE_SUFFIXES)
 MESH_FILES = ("Meshes", tuple(f".{name}" for name in mesh_io.mesh_suffixes()))
 PICTURES = ("Pictures", (".png", ".exr"))
-ENVIRONMENTS = ("Environments", (".exr",))
+ENVIRONMENTS = ("Environments", objects.ENVIRONMENT_SUFFIXES)
 
 # ------------------------------------------------------------------------------------------------ files
 
@@ -180,7 +180,7 @@ def _stem(editor: Editor) -> str:
 
 def select_all(editor: Editor) -> None:
     """Select every object that is shown."""
-    editor.select(Selection(tuple(o.name for o in editor.scene.objects if o.visible)))
+    editor.select(Selection.all_of(editor.scene))
 
 
 def switch_space(editor: Editor) -> None:

@@ -244,11 +244,7 @@ class Editor:
         return self.is_flying or (self.document.history.before is not None and not self._is_held)
 
     def _picked(self, picked: Picked) -> None:
-        if picked.additive:
-            if picked.name is not None:
-                self.select(self.selection.toggled(picked.name))
-        else:
-            self.select(Selection(() if picked.name is None else (picked.name,)))
+        self.select(self.selection.clicked(picked.name, picked.additive))
 
     # --------------------------------------------------------------------------------------- files
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from imgui_bundle import imgui
@@ -66,8 +67,7 @@ class Workspace:
         node = imgui.internal.dock_builder_get_central_node(root)
         return node.pos.x, node.pos.y, node.size.x, node.size.y
 
-    def _window(self, name: str, editor: Editor, draw: object) -> None:
-        assert callable(draw)
+    def _window(self, name: str, editor: Editor, draw: Callable[[Editor], None]) -> None:
         if imgui.begin(name, None, imgui.WindowFlags_.no_collapse)[0]:
             draw(editor)
         imgui.end()
