@@ -1,11 +1,13 @@
-"""Makes the embedded PoCL device work on processors that are younger than it.
+"""Makes the embedded PoCL device work well on processors that are younger than it.
 
 PoCL 3.0 asks its LLVM 14 for the processor's name and hands it to clang as the target. LLVM answers
 "generic" for a processor that it does not know (AMD family 26, for one), and clang refuses just that
 name: "unknown target CPU 'generic'", so no kernel builds (PoCL issue 1049; later versions have
-POCL_LLVM_CPU_NAME, this one has no setting). The x86-64 micro-architecture levels are names that
-clang 14 knows and that any processor can be sorted into by its feature flags, so this module puts the
-right level into the one place of PoCL's device structure that holds the name.
+POCL_LLVM_CPU_NAME, this one has no setting). A newer member of a family that it knows it takes for the
+latest that it has heard of: Zen 4 for "znver3", which has no AVX-512, so that half of the lanes stay empty.
+The x86-64 micro-architecture levels are names that clang 14 knows and that any processor can be sorted into
+by its feature flags, so this module puts the right level into the one place of PoCL's device structure that
+holds the name.
 """
 
 from __future__ import annotations
@@ -17,7 +19,10 @@ from typing import Any
 
 from incpt.errors import DeviceError
 
-_UNKNOWN = b"generic\0"
+_UNKNOWN = "generic"
+_WITHOUT_AVX512 = ("znver3",)
+"""Names that LLVM 14 gives to processors with AVX-512 too."""
+
 # The name stands about 640 bytes from the start; further on, stale copies of the pointer may lie about.
 _DEVICE_STRUCT_BYTES = 1024
 _POINTER_BYTES = ctypes.sizeof(ctypes.c_void_p)
@@ -34,7 +39,8 @@ _targets: dict[int, Any] = {}
 
 
 def name_target(cl_device: Any) -> str | None:
-    """Give PoCL a target that its clang knows, where it has none; return that name, else None.
+    """Give PoCL a target that its clang knows, where it has none, or one with AVX-512, where the processor has
+    it and LLVM's name for it has not; return that name, else None.
 
     Does nothing where the processor is known, or where the structure does not look as expected.
     """
@@ -42,10 +48,11 @@ def name_target(cl_device: Any) -> str | None:
         return None
     address = cl_device.int_ptr
     if address not in _targets:
-        places = _pointers_to_unknown(address)
+        level = target_name(_cpu_flags())
+        places = [place for name in misnomers(level) for place in _pointers_to(name, address)]
         if len(places) != 1:
             return None
-        text = ctypes.create_string_buffer(target_name(_cpu_flags()).encode())
+        text = ctypes.create_string_buffer(level.encode())
         ctypes.c_void_p.from_address(places[0]).value = ctypes.addressof(text)
         _targets[address] = text
     name: str = _targets[address].value.decode()
@@ -70,6 +77,11 @@ def target_name(flags: set[str]) -> str:
     return "x86-64"
 
 
+def misnomers(level: str) -> tuple[str, ...]:
+    """LLVM's names for processors that are better called by this x86-64 level."""
+    return (_UNKNOWN, *_WITHOUT_AVX512) if level == _LEVELS[0][0] else (_UNKNOWN,)
+
+
 def _cpu_flags() -> set[str]:
     for line in Path("/proc/cpuinfo").read_text().splitlines():
         if line.startswith("flags"):
@@ -77,9 +89,9 @@ def _cpu_flags() -> set[str]:
     return set()
 
 
-def _pointers_to_unknown(address: int) -> list[int]:
+def _pointers_to(name: str, address: int) -> list[int]:
     # Read by way of /proc/self/mem, which answers a wild pointer with an error instead of a crash.
-    found = []
+    found, text = [], name.encode() + b"\0"
     with open("/proc/self/mem", "rb", buffering=0) as memory:
 
         def read(start: int, size: int) -> bytes:
@@ -93,6 +105,6 @@ def _pointers_to_unknown(address: int) -> list[int]:
             word = read(place, _POINTER_BYTES)
             if len(word) < _POINTER_BYTES:
                 break
-            if read(int.from_bytes(word, "little"), len(_UNKNOWN)) == _UNKNOWN:
+            if read(int.from_bytes(word, "little"), len(text)) == text:
                 found.append(place)
     return found

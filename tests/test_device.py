@@ -145,14 +145,20 @@ def test_target_is_the_highest_level_that_the_processor_has() -> None:
     assert pocl.target_name(avx512) == "x86-64"
 
 
-def test_unknown_processor_is_looked_for_without_harm() -> None:
+def test_processors_that_llvm_takes_for_older_ones_get_their_avx512() -> None:
+    assert pocl.misnomers("x86-64-v3") == ("generic",)
+    assert pocl.misnomers("x86-64-v4") == ("generic", "znver3")
+
+
+def test_names_of_processors_are_looked_for_without_harm() -> None:
     import ctypes
 
     text = ctypes.create_string_buffer(b"generic")
     struct = (ctypes.c_void_p * 200)()
     struct[3], struct[7] = 8, ctypes.addressof(text)  # a wild pointer, and the one
-    assert pocl._pointers_to_unknown(ctypes.addressof(struct)) == [ctypes.addressof(struct) + 56]
-    assert pocl._pointers_to_unknown(16) == []
+    assert pocl._pointers_to("generic", ctypes.addressof(struct)) == [ctypes.addressof(struct) + 56]
+    assert pocl._pointers_to("gen", ctypes.addressof(struct)) == []
+    assert pocl._pointers_to("generic", 16) == []
 
 
 def test_two_devices_in_a_process_build_the_same_source(device: Device) -> None:
