@@ -20,6 +20,7 @@ from incpt import layout, transform
 from incpt.device import Device
 from incpt.device_scene import DeviceScene
 from incpt.scene import Camera, Scene
+from incpt.wavefront import block_arguments, traces_in_blocks
 
 Floats = npt.NDArray[np.float32]
 
@@ -47,24 +48,28 @@ class Rays:
 
 
 class Tracer:
-    """incpt's traversal of a scene."""
+    """incpt's traversal of a scene, as its path tracer does it on that device."""
 
     def __init__(self, device: Device, scene: Scene) -> None:
         self.device = device
-        self._buffers = DeviceScene(device, scene).geometry[:5]
+        described = DeviceScene(device, scene)
+        self._buffers = described.geometry[:5]
+        self._in_blocks = traces_in_blocks(device)
+        self._arguments = block_arguments(described) if self._in_blocks else self._buffers
         own = (resources.files("incpt.benchmarks") / "trace.cl").read_text("utf-8")
-        text = device.program_text("bvh")
-        program = _built(device, f"{text}\n{own}")
+        file, features = ("trace_blocks", described.variant) if self._in_blocks else ("bvh", ())
+        program = _built(device, f"{device.program_text(file, features)}\n{own}")
         self._kernels = {name: cl.Kernel(program, name) for name in ("trace_closest", "trace_any")}
-        counting = _built(device, f"#define COUNT_VISITS\n{counting_source(text)}\n{own}")
-        self._count = cl.Kernel(counting, "count_visits")
+        text = counting_source(device.program_text("bvh"))
+        self._count = cl.Kernel(_built(device, f"#define COUNT_VISITS\n{text}\n{own}"), "count_visits")
 
     def place(self, rays: Rays) -> PlacedRays:
         """Rays on the device."""
         return PlacedRays(self, rays)
 
     def visits(self, rays: Rays) -> tuple[float, float]:
-        """Nodes, and packs of up to eight triangles, that a ray is tested against in the mean."""
+        """Nodes, and packs of up to eight triangles, that a ray is tested against in the mean, where it goes
+        through the trees alone and nearer boxes first."""
         count = len(rays)
         buffer = self.device.empty(8 * count)
         placed = [self.device.upload(rays.planes), self.device.upload(rays.limits)]
@@ -79,9 +84,11 @@ class Tracer:
         """Trace; returns before it is done."""
         count = len(placed.rays)
         kernel = self._kernels["trace_any" if placed.rays.any_hit else "trace_closest"]
-        self.device.launch(
-            kernel, count, np.uint32(count), placed.planes, placed.limits, *self._buffers, placed.distances
-        )
+        arguments = np.uint32(count), placed.planes, placed.limits, *self._arguments, placed.distances
+        if self._in_blocks:
+            self.device.launch(kernel, -(-count // layout.BLOCK_PATHS), *arguments, work_group=1)
+        else:
+            self.device.launch(kernel, count, *arguments)
 
 
 class PlacedRays:

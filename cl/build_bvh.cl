@@ -344,6 +344,33 @@ __kernel void split_ranges(const uint count, const uint leaf_size, const uint ca
     counts[2 * i + 1] = leaves;
 }
 
+// Sorts the children of a node for rays into each octant, by the centres of their boxes. A ray into the
+// opposite octant takes them backwards.
+static void write_order(__global Node *node) {
+    for (uint octant = 0; octant < 4; octant++) {
+        float depth[BVH_WIDTH];
+        for (uint child = 0; child < BVH_WIDTH; child++) {
+            depth[child] = 0.0f;
+            for (uint axis = 0; axis < 3; axis++) {
+                const float sum = node->bounds[2 * axis][child] + node->bounds[2 * axis + 1][child];
+                depth[child] += octant >> axis & 1 ? -sum : sum;
+            }
+            if (node->child[child] == NODE_EMPTY)
+                depth[child] = INFINITY;
+        }
+        uint order = 0, backwards = 0;
+        for (uint child = 0; child < BVH_WIDTH; child++) {
+            uint farther = 0;
+            for (uint other = 0; other < BVH_WIDTH; other++)
+                farther += depth[other] > depth[child] || (depth[other] == depth[child] && other < child);
+            order |= child << (3 * farther);
+            backwards |= child << (3 * (BVH_WIDTH - 1 - farther));
+        }
+        node->order[octant] = order;
+        node->order[7 - octant] = backwards;
+    }
+}
+
 // Refers node i to its children: inner ones become ranges of the next level, leaves packs or objects.
 // `offsets` holds, for each node, the number of inner children and of leaves of the nodes before it.
 __kernel void link_children(const uint count, const uint leaf_size, const uint next_node,
@@ -377,6 +404,7 @@ __kernel void link_children(const uint count, const uint leaf_size, const uint n
         }
         nodes[i].child[child] = reference;
     }
+    write_order(nodes + i);
 }
 
 __kernel void refit_packs(const uint count, __global TrianglePack *packs, __global const int *faces,
@@ -413,4 +441,5 @@ __kernel void refit_nodes(const uint count, const uint first, __global Node *nod
         }
         write_bounds(nodes + first + i, child, box);
     }
+    write_order(nodes + first + i);
 }

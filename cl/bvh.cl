@@ -43,12 +43,16 @@ typedef struct {
     __global const float *normals; // of the corners of faces, mesh by mesh; for `describe_path` alone
 } Geometry;
 
+// What the box test needs of a ray along one axis: distance to a plane = plane * inverse + shift, shifted so
+// that rounding errs on the side of a hit.
+typedef struct {
+    float inverse, near_shift, far_shift;
+} BvhSlab;
+
 // A ray in the space of one tree, prepared for its tests. Axis z of the triangle test is the direction's
 // largest, x and y are the other two.
 typedef struct {
-    float4 inverse;    // x, y and z; the fourth is not used
-    float4 near_shift; // distance to a plane = plane * inverse + shift
-    float4 far_shift;
+    BvhSlab slab[3];
     size_t near_plane[3]; // offset in a node, bytes
     size_t axis[3];       // x, y and z of the triangle test, as offsets in a pack, bytes
     float origin[3];      // along these
@@ -74,55 +78,87 @@ INLINE uint bvh_lanes(const int8 comparison) {
 #endif
 }
 
-INLINE BvhRay bvh_ray(const float *origin, const float *direction) {
-    BvhRay ray;
-    const float x = FABS(direction[0]), y = FABS(direction[1]), z = FABS(direction[2]);
-    const uint k = x > y ? (x > z ? 0 : 2) : (y > z ? 1 : 2);
-    const float4 o = {origin[0], origin[1], origin[2], 0.0f};
-    const float4 d = {direction[0], direction[1], direction[2], 1.0f};
-    const int4 sign = as_int4(d) & (int4)(INT_MIN);
-    const int4 zero = as_float4(as_int4(d) ^ sign) < BVH_ZERO;
-    const float4 inverse = 1.0f / (zero ? as_float4(sign | as_int4((float4)(1.0f / BVH_INVERSE_ZERO))) : d);
-    const float4 shift = -o * inverse;
+INLINE BvhSlab bvh_slab(float origin, float direction) {
+    const int zero = FABS(direction) < BVH_ZERO;
+    const float least = as_float((as_uint(direction) & 0x80000000u) | as_uint(1.0f / BVH_INVERSE_ZERO));
+    BvhSlab slab;
+    slab.inverse = 1.0f / (zero ? least : direction);
+    const float shift = -origin * slab.inverse;
     // Without a direction the ray lies between the planes or not; on a plane it counts as between.
-    const float4 least = zero ? (float4)(BVH_INVERSE_ZERO * 1e-10f) : (float4)(0.0f);
-    const float4 slack = BVH_MAX8(shift, -shift) * BVH_SLACK + least;
-    ray.inverse = inverse;
-    ray.near_shift = shift - slack;
-    ray.far_shift = shift + slack;
-    ray.near_plane[0] = sign.x ? BVH_PLANE_BYTES : 0;
-    ray.near_plane[1] = (sign.y ? 3 : 2) * BVH_PLANE_BYTES;
-    ray.near_plane[2] = (sign.z ? 5 : 4) * BVH_PLANE_BYTES;
-    const uint axis[3] = {k == 2 ? 0 : k + 1, k == 0 ? 2 : k - 1, k};
-    ray.shear[2] = 1.0f / direction[k];
-    for (uint i = 0; i < 3; i++) {
-        ray.axis[i] = axis[i] * BVH_PLANE_BYTES;
-        ray.origin[i] = origin[axis[i]];
-        if (i < 2)
-            ray.shear[i] = direction[axis[i]] * ray.shear[2];
-    }
+    const float slack = FABS(shift) * BVH_SLACK + (zero ? BVH_INVERSE_ZERO * 1e-10f : 0.0f);
+    slab.near_shift = shift - slack;
+    slab.far_shift = shift + slack;
+    return slab;
+}
+
+// The largest component of a direction, and the other two, which are x and y of the triangle test.
+INLINE uint bvh_main_axis(Vec3 direction) {
+    const float x = FABS(direction.x), y = FABS(direction.y), z = FABS(direction.z);
+    return x > y ? (x > z ? 0u : 2u) : (y > z ? 1u : 2u);
+}
+INLINE uint bvh_x_axis(uint main) { return main == 2u ? 0u : main + 1u; }
+INLINE uint bvh_y_axis(uint main) { return main == 0u ? 2u : main - 1u; }
+
+INLINE float bvh_component(Vec3 v, uint axis) { return axis == 0u ? v.x : axis == 1u ? v.y : v.z; }
+
+// Bit i: the direction is negative along axis i.
+INLINE uint bvh_octant(Vec3 direction) {
+    return as_uint(direction.x) >> 31 | as_uint(direction.y) >> 31 << 1 | as_uint(direction.z) >> 31 << 2;
+}
+
+// Where the planes that a ray into the octant meets first stand in a node.
+INLINE void bvh_point(BvhRay *ray, uint octant, uint main) {
+    ray->near_plane[0] = (octant & 1u) * BVH_PLANE_BYTES;
+    ray->near_plane[1] = (2u + (octant >> 1 & 1u)) * BVH_PLANE_BYTES;
+    ray->near_plane[2] = (4u + (octant >> 2 & 1u)) * BVH_PLANE_BYTES;
+    ray->axis[0] = bvh_x_axis(main) * BVH_PLANE_BYTES;
+    ray->axis[1] = bvh_y_axis(main) * BVH_PLANE_BYTES;
+    ray->axis[2] = main * BVH_PLANE_BYTES;
+}
+
+INLINE BvhRay bvh_ray(Vec3 origin, Vec3 direction) {
+    BvhRay ray;
+    const uint main = bvh_main_axis(direction), x = bvh_x_axis(main), y = bvh_y_axis(main);
+    bvh_point(&ray, bvh_octant(direction), main);
+    ray.slab[0] = bvh_slab(origin.x, direction.x);
+    ray.slab[1] = bvh_slab(origin.y, direction.y);
+    ray.slab[2] = bvh_slab(origin.z, direction.z);
+    ray.shear[2] = 1.0f / bvh_component(direction, main);
+    ray.shear[0] = bvh_component(direction, x) * ray.shear[2];
+    ray.shear[1] = bvh_component(direction, y) * ray.shear[2];
+    ray.origin[0] = bvh_component(origin, x);
+    ray.origin[1] = bvh_component(origin, y);
+    ray.origin[2] = bvh_component(origin, main);
     return ray;
 }
 
 // Eight floats of a node or a pack, `offset` bytes from its start.
 #define BVH_LOAD(place, offset) (*(__global const float8 *)((__global const char *)(place) + (offset)))
 
-// Distances at which the ray enters the boxes of a node, and which of them it meets before `limit`.
-INLINE uint bvh_boxes(const BvhRay *ray, __global const Node *node, float limit, float8 *entry) {
-    const float8 near_x = BVH_LOAD(node, ray->near_plane[0]) * ray->inverse.x + ray->near_shift.x;
-    const float8 near_y = BVH_LOAD(node, ray->near_plane[1]) * ray->inverse.y + ray->near_shift.y;
-    const float8 near_z = BVH_LOAD(node, ray->near_plane[2]) * ray->inverse.z + ray->near_shift.z;
+// Distances at which the ray enters and leaves the boxes of a node between 0 and `limit`; it meets those
+// which it does not leave before it enters.
+INLINE void bvh_box_distances(const BvhRay *ray, __global const Node *node, float limit, float8 *entry,
+                              float8 *exit) {
+    const float8 near_x = BVH_LOAD(node, ray->near_plane[0]) * ray->slab[0].inverse + ray->slab[0].near_shift;
+    const float8 near_y = BVH_LOAD(node, ray->near_plane[1]) * ray->slab[1].inverse + ray->slab[1].near_shift;
+    const float8 near_z = BVH_LOAD(node, ray->near_plane[2]) * ray->slab[2].inverse + ray->slab[2].near_shift;
     const float8 far_x =
-        BVH_LOAD(node, ray->near_plane[0] ^ BVH_PLANE_BYTES) * ray->inverse.x + ray->far_shift.x;
+        BVH_LOAD(node, ray->near_plane[0] ^ BVH_PLANE_BYTES) * ray->slab[0].inverse + ray->slab[0].far_shift;
     const float8 far_y =
-        BVH_LOAD(node, ray->near_plane[1] ^ BVH_PLANE_BYTES) * ray->inverse.y + ray->far_shift.y;
+        BVH_LOAD(node, ray->near_plane[1] ^ BVH_PLANE_BYTES) * ray->slab[1].inverse + ray->slab[1].far_shift;
     const float8 far_z =
-        BVH_LOAD(node, ray->near_plane[2] ^ BVH_PLANE_BYTES) * ray->inverse.z + ray->far_shift.z;
+        BVH_LOAD(node, ray->near_plane[2] ^ BVH_PLANE_BYTES) * ray->slab[2].inverse + ray->slab[2].far_shift;
     const float8 near_xy = BVH_MAX8(near_x, near_y), near_z0 = BVH_MAX8(near_z, (float8)(0.0f));
     const float8 far_xy = BVH_MIN8(far_x, far_y), far_z1 = BVH_MIN8(far_z, (float8)(limit));
-    const float8 near = BVH_MAX8(near_xy, near_z0), far = BVH_MIN8(far_xy, far_z1);
-    *entry = near;
-    return bvh_lanes(near <= far * (1.0f + BVH_SLACK));
+    *entry = BVH_MAX8(near_xy, near_z0);
+    *exit = BVH_MIN8(far_xy, far_z1) * (1.0f + BVH_SLACK);
+}
+
+// Distances at which the ray enters the boxes of a node, and which of them it meets before `limit`.
+INLINE uint bvh_boxes(const BvhRay *ray, __global const Node *node, float limit, float8 *entry) {
+    float8 exit;
+    bvh_box_distances(ray, node, limit, entry, &exit);
+    return bvh_lanes(*entry <= exit);
 }
 
 // The power of two that brings x between 1 and 2; finite and above 0 for any x that is.
@@ -242,6 +278,7 @@ INLINE bool bvh_keep(uint pack, uint lanes, const float8 distance, const float8 
         return false;
     hit->distance = distances[nearest];
     hit->triangle = pack * BVH_WIDTH + nearest;
+#pragma unroll
     for (uint i = 0; i < 3; i++)
         hit->weight[i] = ((const float *)&weight[i])[nearest];
     return true;
@@ -252,6 +289,7 @@ INLINE void bvh_prefetch(__global const Node *nodes, __global const TrianglePack
 #ifdef INCPT_POCL
     const size_t place =
         reference & NODE_LEAF ? (size_t)(packs + (reference & ~NODE_LEAF)) : (size_t)(nodes + reference);
+#pragma unroll
     for (uint line = 0; line < 5; line++)
         __builtin_prefetch((const void *)(place + 64 * line));
 #endif
@@ -294,36 +332,28 @@ INLINE bool bvh_trace_mesh(const BvhRay *ray, __global const Node *nodes, __glob
     }
 }
 
-INLINE void bvh_transform_point(__global const float *matrix, const float *p, float *result) {
-    for (uint i = 0; i < 3; i++)
-        result[i] =
-            matrix[4 * i] * p[0] + matrix[4 * i + 1] * p[1] + matrix[4 * i + 2] * p[2] + matrix[4 * i + 3];
-}
-
-INLINE void bvh_transform_vector(__global const float *matrix, const float *v, float *result) {
-    for (uint i = 0; i < 3; i++)
-        result[i] = matrix[4 * i] * v[0] + matrix[4 * i + 1] * v[1] + matrix[4 * i + 2] * v[2];
-}
-
 // The ray in the space of an object. The direction keeps its length there, so that t is the same.
-INLINE BvhRay bvh_object_ray(__global const Object *object, const float *origin, const float *direction) {
-    float object_origin[3], object_direction[3];
-    bvh_transform_point(object->object_from_world, origin, object_origin);
-    bvh_transform_vector(object->object_from_world, direction, object_direction);
-    return bvh_ray(object_origin, object_direction);
+INLINE Vec3 bvh_object_point(__global const Object *object, Vec3 p) {
+    __global const float *m = object->object_from_world;
+    return vec3(m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3], m[4] * p.x + m[5] * p.y + m[6] * p.z + m[7],
+                m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11]);
+}
+INLINE Vec3 bvh_object_vector(__global const Object *object, Vec3 v) {
+    __global const float *m = object->object_from_world;
+    return vec3(m[0] * v.x + m[1] * v.y + m[2] * v.z, m[4] * v.x + m[5] * v.y + m[6] * v.z,
+                m[8] * v.x + m[9] * v.y + m[10] * v.z);
 }
 
-INLINE bool bvh_trace_object(const Geometry *geometry, __global const Object *object, const float *origin,
-                             const float *direction, const bool any, BvhHit *hit) {
-    const BvhRay ray = bvh_object_ray(object, origin, direction);
+INLINE bool bvh_trace_object(const Geometry *geometry, __global const Object *object, Vec3 origin,
+                             Vec3 direction, const bool any, BvhHit *hit) {
+    const BvhRay ray = bvh_ray(bvh_object_point(object, origin), bvh_object_vector(object, direction));
     return bvh_trace_mesh(&ray, geometry->nodes + object->first_node, geometry->packs + object->first_pack,
                           any, hit);
 }
 
 // Nearest hit of the scene with 0 < t < hit->distance, else object is NO_INDEX; any one of them if `any`,
 // which fills nothing in.
-INLINE bool bvh_trace(const Geometry *geometry, const float *origin, const float *direction, const bool any,
-                      BvhHit *hit) {
+INLINE bool bvh_trace(const Geometry *geometry, Vec3 origin, Vec3 direction, const bool any, BvhHit *hit) {
     __global const Node *top_nodes = geometry->top_nodes;
     const BvhRay ray = bvh_ray(origin, direction);
     ulong stack[BVH_TOP_STACK_SIZE];

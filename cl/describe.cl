@@ -66,7 +66,7 @@ INLINE Vec3 leave_edge(Vec3 centroid, float offset, Vec3 position) {
 // Fills in the planes of a hit of which `trace_path` has left the distance, the object, the place of the
 // triangle, and the weights of its corners, up to a common factor, in place of the position.
 INLINE void describe_path(const Geometry *geometry, const State *state, uint path) {
-    uint stride = state->stride;
+    uint stride = STRIDE(state);
     __global const Object *object = geometry->objects + load_bits(state->hits, HIT_OBJECT * stride + path);
     uint place = load_bits(state->hits, HIT_TRIANGLE * stride + path);
 #ifdef ALL_ON_TOP

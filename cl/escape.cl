@@ -6,7 +6,7 @@
 // open, a ray leaves through an endless stretch of its medium, as a shadow ray to the environment does.
 INLINE void escape_path(const Params *params, const Emitters *emitters, const State *state, uint path,
                         uint result) {
-    uint stride = state->stride;
+    uint stride = STRIDE(state);
     Vec3 direction = load3(state->rays + RAY_DIRECTION_X * stride, stride, path);
     Vec3 throughput = load3(state->paths + PATH_THROUGHPUT_R * stride, stride, path);
 #ifdef MEDIA

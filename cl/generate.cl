@@ -16,7 +16,7 @@ INLINE uint quotient(uint a, uint b) {
 // buffer, and its camera ray. Paths of a group of slots go pixel by pixel with the repetitions innermost.
 INLINE void generate_path(const Params *params, __global const Slot *slots, const State *state, uint path,
                           uint place) {
-    uint stride = state->stride;
+    uint stride = STRIDE(state);
     uint tile_pixels = params->tile_size * params->tile_size;
     __global const Slot *slot = &slots[quotient(place, tile_pixels)];
     uint group_count = slot->group_count;

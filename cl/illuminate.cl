@@ -6,7 +6,7 @@
 // nothing is in the way, and its density. A stage of its own, since all surfaces share it, and since what
 // PoCL vectorises it does in small kernels.
 INLINE void illuminate_path(const Params *params, const Emitters *emitters, const State *state, uint path) {
-    uint stride = state->stride;
+    uint stride = STRIDE(state);
     Vec3 position = load3(state->hits + HIT_POSITION_X * stride, stride, path);
     uint seed = pixel_seed(load_bits(state->paths, PATH_PIXEL * stride + path), params->seed);
     uint sample = load_bits(state->paths, PATH_SAMPLE * stride + path);

@@ -9,8 +9,8 @@ typedef struct {
 } MediumStack;
 
 INLINE MediumStack load_medium_stack(const State *state, uint path) {
-    uint low = load_bits(state->paths, PATH_MEDIUM_0 * state->stride + path);
-    uint high = load_bits(state->paths, PATH_MEDIUM_1 * state->stride + path);
+    uint low = load_bits(state->paths, PATH_MEDIUM_0 * STRIDE(state) + path);
+    uint high = load_bits(state->paths, PATH_MEDIUM_1 * STRIDE(state) + path);
     MediumStack stack;
     stack.entry[0] = low & 0xffffu;
     stack.entry[1] = low >> 16;
@@ -20,8 +20,8 @@ INLINE MediumStack load_medium_stack(const State *state, uint path) {
 }
 
 INLINE void store_medium_stack(const State *state, uint path, const MediumStack *stack) {
-    store_bits(state->paths, PATH_MEDIUM_0 * state->stride + path, stack->entry[0] | (stack->entry[1] << 16));
-    store_bits(state->paths, PATH_MEDIUM_1 * state->stride + path, stack->entry[2] | (stack->entry[3] << 16));
+    store_bits(state->paths, PATH_MEDIUM_0 * STRIDE(state) + path, stack->entry[0] | (stack->entry[1] << 16));
+    store_bits(state->paths, PATH_MEDIUM_1 * STRIDE(state) + path, stack->entry[2] | (stack->entry[3] << 16));
 }
 
 // The properties of a medium, or of any material in place of none: all lanes read one.

@@ -10,7 +10,7 @@
 INLINE int light_boundary(__global const Material *materials, const State *state, uint path,
                           const Boundary *boundary, Frame frame, Vec3 wo, Vec3 geometric, Vec3 throughput,
                           uint near, uint far, int opaque) {
-    uint stride = state->stride;
+    uint stride = STRIDE(state);
     Vec3 position = load3(state->hits + HIT_POSITION_X * stride, stride, path);
     float offset = state->hits[HIT_OFFSET * stride + path];
     Vec3 to_light = load3(state->shadows + SHADOW_DIRECTION_X * stride, stride, path);
@@ -32,7 +32,7 @@ INLINE int light_boundary(__global const Material *materials, const State *state
 
 INLINE void shade_medium_path(const Params *params, __global const Material *materials, const State *state,
                               uint path, uint result) {
-    uint stride = state->stride;
+    uint stride = STRIDE(state);
     uint hit_material = load_bits(state->hits, HIT_MATERIAL * stride + path);
     __global const Material *material = &materials[hit_material];
     Vec3 direction = load3(state->rays + RAY_DIRECTION_X * stride, stride, path);
@@ -141,7 +141,7 @@ INLINE void shade_medium_path(const Params *params, __global const Material *mat
 // `shade` knows no media: for a path on an opaque surface inside of one, the light that its shadow ray will
 // bring is absorbed beforehand.
 INLINE void absorb_light(__global const Material *materials, const State *state, uint path) {
-    uint stride = state->stride;
+    uint stride = STRIDE(state);
     Vec3 passed = transmittance(materials, load_medium_stack(state, path).entry[0],
                                 state->shadows[SHADOW_DISTANCE * stride + path]);
     Vec3 light = load3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path);

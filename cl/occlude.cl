@@ -4,7 +4,7 @@
 
 INLINE void occlude_path(const Geometry *geometry, const State *state, uint path, uint result) {
     if (!is_occluded(geometry, state, path))
-        gather(state, result, load3(state->shadows + SHADOW_RADIANCE_R * state->stride, state->stride, path));
+        gather(state, result, load3(state->shadows + SHADOW_RADIANCE_R * STRIDE(state), STRIDE(state), path));
 }
 
 #ifndef BLOCKS

@@ -12,7 +12,7 @@
 
 // The path's end: rays after which no path goes on gather emission only.
 INLINE void finish_path(__global const Material *materials, const State *state, uint path, uint result) {
-    uint stride = state->stride;
+    uint stride = STRIDE(state);
     __global const Material *material = &materials[load_bits(state->hits, HIT_MATERIAL * stride + path)];
     Vec3 direction = load3(state->rays + RAY_DIRECTION_X * stride, stride, path);
     Vec3 geometric = load3(state->hits + HIT_GEOMETRIC_X * stride, stride, path);
@@ -26,7 +26,7 @@ INLINE void finish_path(__global const Material *materials, const State *state, 
 
 INLINE void shade_path(const Params *params, __global const Material *materials, __global const float *layers,
                        const State *state, uint path, uint result) {
-    uint stride = state->stride;
+    uint stride = STRIDE(state);
 
     // Where the ray ended.
     uint material_index = load_bits(state->hits, HIT_MATERIAL * stride + path);

@@ -4,13 +4,17 @@
 //
 // A wavefront keeps the paths of a chunk in global memory, and each stage is a kernel over them. A block of
 // paths (trace_blocks.cl) lies in local memory, and the stages are loops of one kernel. Both call the same
-// functions, which see the state through this struct. Where the strides are constants, compilers know that
-// neighbouring paths lie next to each other.
+// functions, which see the state through this struct. Strides of a block are constants, so that the way to a
+// plane is known when the kernel is built.
 
 #ifdef BLOCKS
 #define STATE __local
+#define STRIDE(state) BLOCK_STRIDE
+#define RADIANCE_STRIDE(state) BLOCK_STRIDE
 #else
 #define STATE __global
+#define STRIDE(state) (state)->stride
+#define RADIANCE_STRIDE(state) (state)->radiance_stride
 #endif
 
 typedef struct {
@@ -19,8 +23,10 @@ typedef struct {
     STATE float *hits;
     STATE float *shadows;
     STATE float *radiance; // three planes, what each path has gathered
-    uint stride;           // of the planes
+#ifndef BLOCKS
+    uint stride; // of the planes
     uint radiance_stride;
+#endif
 } State;
 
 INLINE Vec3 load3(STATE const float *plane, uint stride, uint i) {
@@ -38,6 +44,6 @@ INLINE void store_bits(STATE float *planes, uint place, uint bits) { ((STATE uin
 
 // Adds to what a path has gathered; `result` is its place there.
 INLINE void gather(const State *state, uint result, Vec3 radiance) {
-    store3(state->radiance, state->radiance_stride, result,
-           add(load3(state->radiance, state->radiance_stride, result), radiance));
+    store3(state->radiance, RADIANCE_STRIDE(state), result,
+           add(load3(state->radiance, RADIANCE_STRIDE(state), result), radiance));
 }

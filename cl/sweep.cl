@@ -62,6 +62,7 @@ INLINE float16 sweep_edge(const float16 ax, const float16 ay, const float16 bx, 
 INLINE int16 sweep_box(__global const float *bounds, const uint *axes, const float16 *origin,
                        const float16 *inverse, const float16 *least, float16 limit) {
     float16 near = 0.0f, far = limit;
+#pragma unroll
     for (uint i = 0; i < 3; i++) {
         const float16 a = (bounds[2 * axes[i]] - origin[i]) * inverse[i];
         const float16 b = (bounds[2 * axes[i] + 1] - origin[i]) * inverse[i];
@@ -78,12 +79,14 @@ static __attribute__((noinline)) WIDE void sweep_rays(const Sweep *sweep, uint f
     const uint x = axis == 2 ? 0 : axis + 1, y = axis == 0 ? 2 : axis - 1;
     const uint axes[3] = {x, y, axis};
     float16 origin[3], shear[3], weight[3], inverse[3], least[3];
+#pragma unroll
     for (uint i = 0; i < 3; i++) {
-        origin[i] = sweep_load(planes + (SWEEP_ORIGIN + i) * BLOCK_PATHS);
-        shear[i] = sweep_load(planes + (SWEEP_SHEAR + i) * BLOCK_PATHS);
+        origin[i] = sweep_load(planes + (SWEEP_ORIGIN + i) * BLOCK_STRIDE);
+        shear[i] = sweep_load(planes + (SWEEP_SHEAR + i) * BLOCK_STRIDE);
         weight[i] = 0.0f;
     }
-    float16 limit = sweep_load(planes + SWEEP_LIMIT * BLOCK_PATHS);
+    float16 limit = sweep_load(planes + SWEEP_LIMIT * BLOCK_STRIDE);
+#pragma unroll
     for (uint i = 0; i < 2; i++) {
         const int16 sign = as_int16(shear[i]) & INT_MIN;
         const int16 zero = as_float16(as_int16(shear[i]) ^ sign) < BVH_ZERO;
@@ -94,9 +97,12 @@ static __attribute__((noinline)) WIDE void sweep_rays(const Sweep *sweep, uint f
     inverse[2] = shear[2];
     least[2] = 0.0f;
     uint16 place = NO_INDEX;
-    for (uint p = 0; p < sweep->pack_count; p++) {
-        if (!sweep_any(sweep_box(sweep->bounds + 6 * p, axes, origin, inverse, least, limit)))
-            continue;
+    uint waiting = 0;
+    for (uint p = 0; p < sweep->pack_count; p++)
+        waiting |= (uint)sweep_any(sweep_box(sweep->bounds + 6 * p, axes, origin, inverse, least, limit))
+                   << p;
+    for (; waiting; waiting &= waiting - 1) {
+        const uint p = BVH_FIRST_BIT(waiting);
         __global const TrianglePack *pack = sweep->packs + p;
         for (uint lane = 0; lane < BVH_WIDTH && pack->face[lane] != NO_INDEX; lane++) {
             const float16 az = pack->vertex[axis][lane] - origin[2];
@@ -112,46 +118,44 @@ static __attribute__((noinline)) WIDE void sweep_rays(const Sweep *sweep, uint f
                           w = sweep_edge(bx, by, ax, ay);
             const float16 lowest = BVH_MIN8(BVH_MIN8(u, v), w), highest = BVH_MAX8(BVH_MAX8(u, v), w);
             const float16 determinant = u + v + w, depth = (u * az + v * bz + w * cz) * shear[2];
-            const int16 sign = as_int16(determinant) & INT_MIN;
-            const float16 size = as_float16(as_int16(determinant) ^ sign);
-            const float16 scaled = as_float16(as_int16(depth) ^ sign);
-            const int16 met =
-                ((lowest >= 0.0f) | (highest <= 0.0f)) & (scaled > 0.0f) & (scaled < size * limit);
-            if (!sweep_any(met))
-                continue;
-            limit = met ? depth / determinant : limit;
+            // Divided before it is compared: what waits for the triangle before is the comparison alone.
+            // A determinant of 0 fails one of them.
+            const float16 distance = depth / determinant;
+            const int16 met = ((lowest >= 0.0f) | (highest <= 0.0f)) & (distance > 0.0f) & (distance < limit);
+            limit = met ? distance : limit;
             weight[0] = met ? u : weight[0];
             weight[1] = met ? v : weight[1];
             weight[2] = met ? w : weight[2];
             place = met ? (uint16)((p * BVH_WIDTH + lane) | NODE_PACK) : place;
         }
     }
-    sweep_store(planes + SWEEP_LIMIT * BLOCK_PATHS, limit);
+    sweep_store(planes + SWEEP_LIMIT * BLOCK_STRIDE, limit);
+#pragma unroll
     for (uint i = 0; i < 3; i++)
-        sweep_store(planes + (SWEEP_WEIGHT + i) * BLOCK_PATHS, weight[i]);
-    sweep_store(planes + SWEEP_PLACE * BLOCK_PATHS, as_float16(place));
+        sweep_store(planes + (SWEEP_WEIGHT + i) * BLOCK_STRIDE, weight[i]);
+    sweep_store(planes + SWEEP_PLACE * BLOCK_STRIDE, as_float16(place));
 }
 
-// Makes the ray in planes `ray` of a path ready: origin and direction, BLOCK_PATHS apart, x first.
+// Makes the ray in planes `ray` of a path ready: origin and direction, BLOCK_STRIDE apart, x first.
 INLINE void sweep_prepare(const Sweep *sweep, uint place, __local const float *ray, uint path, uint axis,
                           float limit) {
     __local float *planes = sweep->planes + place;
     const uint x = axis == 2 ? 0 : axis + 1, y = axis == 0 ? 2 : axis - 1;
-    __local const float *direction = ray + 3 * BLOCK_PATHS;
-    const float inverse = 1.0f / direction[axis * BLOCK_PATHS + path];
-    planes[(SWEEP_ORIGIN + 0) * BLOCK_PATHS] = ray[x * BLOCK_PATHS + path];
-    planes[(SWEEP_ORIGIN + 1) * BLOCK_PATHS] = ray[y * BLOCK_PATHS + path];
-    planes[(SWEEP_ORIGIN + 2) * BLOCK_PATHS] = ray[axis * BLOCK_PATHS + path];
-    planes[(SWEEP_SHEAR + 0) * BLOCK_PATHS] = direction[x * BLOCK_PATHS + path] * inverse;
-    planes[(SWEEP_SHEAR + 1) * BLOCK_PATHS] = direction[y * BLOCK_PATHS + path] * inverse;
-    planes[(SWEEP_SHEAR + 2) * BLOCK_PATHS] = inverse;
-    planes[SWEEP_LIMIT * BLOCK_PATHS] = limit;
+    __local const float *direction = ray + 3 * BLOCK_STRIDE;
+    const float inverse = 1.0f / direction[axis * BLOCK_STRIDE + path];
+    planes[(SWEEP_ORIGIN + 0) * BLOCK_STRIDE] = ray[x * BLOCK_STRIDE + path];
+    planes[(SWEEP_ORIGIN + 1) * BLOCK_STRIDE] = ray[y * BLOCK_STRIDE + path];
+    planes[(SWEEP_ORIGIN + 2) * BLOCK_STRIDE] = ray[axis * BLOCK_STRIDE + path];
+    planes[(SWEEP_SHEAR + 0) * BLOCK_STRIDE] = direction[x * BLOCK_STRIDE + path] * inverse;
+    planes[(SWEEP_SHEAR + 1) * BLOCK_STRIDE] = direction[y * BLOCK_STRIDE + path] * inverse;
+    planes[(SWEEP_SHEAR + 2) * BLOCK_STRIDE] = inverse;
+    planes[SWEEP_LIMIT * BLOCK_STRIDE] = limit;
 }
 
 // The largest component of a path's ray.
 INLINE uint sweep_axis(__local const float *ray, uint path) {
-    __local const float *direction = ray + 3 * BLOCK_PATHS + path;
-    const float x = FABS(direction[0]), y = FABS(direction[BLOCK_PATHS]),
-                z = FABS(direction[2 * BLOCK_PATHS]);
+    __local const float *direction = ray + 3 * BLOCK_STRIDE + path;
+    const float x = FABS(direction[0]), y = FABS(direction[BLOCK_STRIDE]),
+                z = FABS(direction[2 * BLOCK_STRIDE]);
     return x > y ? (x > z ? 0u : 2u) : (y > z ? 1u : 2u);
 }

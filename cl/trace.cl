@@ -12,25 +12,15 @@
 #endif
 
 // Leaves the nearest hit of a path's ray in its planes, as far as `describe_path` needs it. False, and object
-// NO_INDEX, where the ray leaves the scene. With FEW_ON_TOP a hit with a triangle of the top level is there
-// already, and stays where nothing is nearer.
+// NO_INDEX, where the ray leaves the scene.
 TRACE_CALL bool trace_path(const Geometry *geometry, const State *state, uint path) {
-    const uint stride = state->stride;
-    STATE const float *ray = state->rays + path;
-    const float origin[3] = {ray[RAY_ORIGIN_X * stride], ray[RAY_ORIGIN_Y * stride],
-                             ray[RAY_ORIGIN_Z * stride]};
-    const float direction[3] = {ray[RAY_DIRECTION_X * stride], ray[RAY_DIRECTION_Y * stride],
-                                ray[RAY_DIRECTION_Z * stride]};
+    const uint stride = STRIDE(state);
+    const Vec3 origin = load3(state->rays + RAY_ORIGIN_X * stride, stride, path);
+    const Vec3 direction = load3(state->rays + RAY_DIRECTION_X * stride, stride, path);
     BvhHit hit;
     STATE float *hits = state->hits + path;
-#ifdef FEW_ON_TOP
-    hit.distance = hits[HIT_DISTANCE * stride];
-    if (!bvh_trace(geometry, origin, direction, false, &hit))
-        return as_uint(hits[HIT_OBJECT * stride]) != NO_INDEX;
-#else
     hit.distance = INFINITY;
     bvh_trace(geometry, origin, direction, false, &hit);
-#endif
     hits[HIT_DISTANCE * stride] = hit.distance;
     hits[HIT_OBJECT * stride] = as_float(hit.object);
     if (hit.object == NO_INDEX)
@@ -44,21 +34,18 @@ TRACE_CALL bool trace_path(const Geometry *geometry, const State *state, uint pa
 // Which shading kernel a path that has hit something waits for.
 INLINE uint surface_class(const Geometry *geometry, __global const Material *materials, const State *state,
                           uint path) {
-    uint in_medium = load_bits(state->paths, PATH_MEDIUM_0 * state->stride + path) != NO_INDEX;
-    uint object = load_bits(state->hits, HIT_OBJECT * state->stride + path);
+    uint in_medium = load_bits(state->paths, PATH_MEDIUM_0 * STRIDE(state) + path) != NO_INDEX;
+    uint object = load_bits(state->hits, HIT_OBJECT * STRIDE(state) + path);
     uint transmissive = materials[geometry->objects[object].material].flags & MATERIAL_TRANSMISSIVE;
     return in_medium | transmissive ? CLASS_MEDIUM : CLASS_SURFACE;
 }
 
 // Whether anything is in the way of a path's shadow ray.
 TRACE_CALL bool is_occluded(const Geometry *geometry, const State *state, uint path) {
-    const uint stride = state->stride;
-    STATE const float *shadow = state->shadows + path;
-    const float origin[3] = {shadow[SHADOW_ORIGIN_X * stride], shadow[SHADOW_ORIGIN_Y * stride],
-                             shadow[SHADOW_ORIGIN_Z * stride]};
-    const float direction[3] = {shadow[SHADOW_DIRECTION_X * stride], shadow[SHADOW_DIRECTION_Y * stride],
-                                shadow[SHADOW_DIRECTION_Z * stride]};
+    const uint stride = STRIDE(state);
+    const Vec3 origin = load3(state->shadows + SHADOW_ORIGIN_X * stride, stride, path);
+    const Vec3 direction = load3(state->shadows + SHADOW_DIRECTION_X * stride, stride, path);
     BvhHit hit;
-    hit.distance = shadow[SHADOW_DISTANCE * stride];
+    hit.distance = state->shadows[SHADOW_DISTANCE * stride + path];
     return bvh_trace(geometry, origin, direction, true, &hit);
 }

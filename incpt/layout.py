@@ -39,6 +39,9 @@ WORK_GROUP_SIZE = 64
 
 BLOCK_PATHS = 1024
 """Paths that one work-item of `trace_blocks` takes from start to end: their state fits into a cache."""
+BLOCK_STRIDE = BLOCK_PATHS + 16
+"""Floats from plane to plane of a block. At a power of two the planes would share the few lines of a nearest
+cache that are kept for their addresses, and drive each other out; this is one line more."""
 
 COMPACT_BLOCK = 64
 """Paths that one work-item of `compact` looks at: few atomics, and enough work-items for a GPU."""
@@ -201,6 +204,9 @@ NODE = _packed(
         ("bounds", np.float32, (6, BVH_WIDTH)),
         # Another node of the same tree, NODE_LEAF | pack or object, or NODE_EMPTY.
         ("child", np.uint32, (BVH_WIDTH,)),
+        # The children from the farthest to the nearest for a ray into each octant (bit i of its number: the
+        # direction is negative along axis i), three bits for each, the first in the lowest.
+        ("order", np.uint32, (BVH_WIDTH,)),
     ]
 )
 

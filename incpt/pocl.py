@@ -39,8 +39,8 @@ _targets: dict[int, Any] = {}
 
 
 def name_target(cl_device: Any) -> str | None:
-    """Give PoCL a target that its clang knows, where it has none, or one with AVX-512, where the processor has
-    it and LLVM's name for it has not; return that name, else None.
+    """Give PoCL a target that its clang knows, where it has none, or one with AVX-512, where the processor
+    has it and LLVM's name for it has not; return that name, else None.
 
     Does nothing where the processor is known, or where the structure does not look as expected.
     """

@@ -25,7 +25,30 @@ _MOST_LISTS = 3
 _MOST_RAYS = 256
 """Bound on the rays of a path; kernels end paths before it."""
 
+_SPARE_PLANES = 13
+"""Planes of a block that its stages use for themselves; see cl/sweep.cl and cl/flights.cl."""
+_BLOCK_PLANES = (
+    *map(len, (layout.RayPlane, layout.PathPlane, layout.HitPlane, layout.ShadowPlane)),
+    3,  # radiance
+    1, 1, 3,  # lists of places
+    _SPARE_PLANES,
+)  # fmt: skip
+
 _Class = layout.PathClass
+
+
+def traces_in_blocks(device: Device) -> bool:
+    """Whether paths are traced in blocks, by one kernel that is made for PoCL's compiler on CPUs."""
+    return device.is_pocl and device.is_cpu
+
+
+def block_arguments(scene: DeviceScene) -> list[Any]:
+    """What kernels over blocks of paths need of a scene, and the memory of a block."""
+    memory = [cl.LocalMemory(4 * n * layout.BLOCK_STRIDE) for n in _BLOCK_PLANES]
+    return [
+        scene.buffer("block_nodes"), *scene.geometry[1:], scene.buffer("normals"), scene.buffer("layers"),
+        *scene.emitters, *memory, scene.buffer("top_bounds"), np.uint32(scene.top_pack_count),
+    ]  # fmt: skip
 
 
 class Wavefront:
@@ -33,7 +56,7 @@ class Wavefront:
 
     def __init__(self, device: Device) -> None:
         self.device = device
-        self.in_blocks = device.is_pocl and device.is_cpu
+        self.in_blocks = traces_in_blocks(device)
         self.chunk_paths = device.tuning.chunk_paths
         # The last place is a scratch path, which idle lanes of a group read and write.
         self.stride = self.chunk_paths + layout.WORK_GROUP_SIZE
@@ -83,13 +106,9 @@ class Wavefront:
         # One at least, to build the kernel. A block past the last path would take its count for a huge one.
         blocks = max(-(-path_count // layout.BLOCK_PATHS), 1)
         kernel = self.device.kernel("trace_blocks", features=scene.variant)
-        planes = (layout.RayPlane, layout.PathPlane, layout.HitPlane, layout.ShadowPlane)
-        local = [cl.LocalMemory(4 * n * layout.BLOCK_PATHS) for n in (*map(len, planes), 3, 1, 1, 3, 11)]
         self.device.launch(
-            kernel, blocks, whole, slots, scene.buffer("block_nodes"),
-            *scene.geometry[1:], scene.buffer("normals"), scene.buffer("layers"), *scene.emitters, *local,
-            scene.buffer("top_bounds"), np.uint32(scene.top_pack_count), radiance, work_group=1,
-        )  # fmt: skip
+            kernel, blocks, whole, slots, *block_arguments(scene), radiance, work_group=1
+        )
 
     def first_hits(
         self,
