@@ -48,13 +48,14 @@ class Rays:
 
 
 class Tracer:
-    """incpt's traversal of a scene, as its path tracer does it on that device."""
+    """incpt's traversal of a scene with a lamp, as its path tracer does it on that device, or, as `in_blocks`
+    says, as it does it with blocks of paths (on PoCL alone) or with a wavefront."""
 
-    def __init__(self, device: Device, scene: Scene) -> None:
+    def __init__(self, device: Device, scene: Scene, in_blocks: bool | None = None) -> None:
         self.device = device
         described = DeviceScene(device, scene)
         self._buffers = described.geometry[:5]
-        self._in_blocks = traces_in_blocks(device)
+        self._in_blocks = traces_in_blocks(device) if in_blocks is None else in_blocks
         self._arguments = block_arguments(described) if self._in_blocks else self._buffers
         own = (resources.files("incpt.benchmarks") / "trace.cl").read_text("utf-8")
         file, features = ("trace_blocks", described.variant) if self._in_blocks else ("bvh", ())

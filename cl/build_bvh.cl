@@ -352,7 +352,9 @@ static void write_order(__global Node *node) {
         for (uint child = 0; child < BVH_WIDTH; child++) {
             depth[child] = 0.0f;
             for (uint axis = 0; axis < 3; axis++) {
-                const float sum = node->bounds[2 * axis][child] + node->bounds[2 * axis + 1][child];
+                // Scaled, so that no sum leaves the range of a float.
+                const float sum =
+                    0.125f * node->bounds[2 * axis][child] + 0.125f * node->bounds[2 * axis + 1][child];
                 depth[child] += octant >> axis & 1 ? -sum : sum;
             }
             if (node->child[child] == NODE_EMPTY)

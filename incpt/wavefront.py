@@ -106,9 +106,7 @@ class Wavefront:
         # One at least, to build the kernel. A block past the last path would take its count for a huge one.
         blocks = max(-(-path_count // layout.BLOCK_PATHS), 1)
         kernel = self.device.kernel("trace_blocks", features=scene.variant)
-        self.device.launch(
-            kernel, blocks, whole, slots, *block_arguments(scene), radiance, work_group=1
-        )
+        self.device.launch(kernel, blocks, whole, slots, *block_arguments(scene), radiance, work_group=1)
 
     def first_hits(
         self,

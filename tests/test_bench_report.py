@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -15,13 +16,15 @@ from incpt.benchmarks import build, plots, quoted, rays, report, scale
 from incpt.benchmarks.catalogue import EXPERIMENTS
 from incpt.benchmarks.experiment import run
 from incpt.benchmarks.fit import fitted
-from incpt.benchmarks.scenes import SCENES
+from incpt.benchmarks.scenes import SCENES, crowd, cube, icosphere, plane
 from incpt.benchmarks.store import Results, Store, read
 from incpt.benchmarks.timing import summary
 from incpt.benchmarks.traversal import Rays, Tracer, camera_rays, scattered_rays, shadow_rays
 from incpt.device import Device
 from incpt.errors import InputError
+from incpt.scene import Material, Scene
 from incpt.session import Session
+from incpt.wavefront import traces_in_blocks
 
 pytest.importorskip("matplotlib")
 
@@ -82,6 +85,35 @@ def test_visits_count_tests(tracer: Tracer, device: Device) -> None:
     assert tracer.visits(any_hit)[1] <= packs
     plates = SCENES["plates"].scene
     assert Tracer(device, plates).visits(camera_rays(plates.camera, (16, 16)))[0] > nodes
+
+
+def _among_balls() -> Scene:
+    """Objects with trees of their own, one of them invisible, among more triangles than are swept over."""
+    balls = crowd(30, icosphere(3))
+    lamp_material = {"lamp": Material(emission=(9, 9, 9))}
+    lamps = [plane(f"lamp {i}", "lamp", (i - 1, 2.5, 0), (180, 20 * i, 0), (0.4, 1, 0.4)) for i in range(3)]
+    bricks = [
+        cube(f"brick {i}", "floor", (0.25 * i - 1.9, 0.1, 1.9), (0, 31 * i, 0), (0.1,) * 3) for i in range(16)
+    ]
+    hidden = replace(balls.objects[5], visible=False)
+    objects = (*balls.objects[:5], hidden, *balls.objects[6:], *lamps, *bricks)
+    return replace(balls, materials={**balls.materials, **lamp_material}, objects=objects)
+
+
+@pytest.mark.parametrize("name", [*SCENES, "balls"])
+def test_rays_in_blocks_meet_what_rays_of_a_wavefront_meet(name: str, device: Device) -> None:
+    """Swept, several at a time through trees, and one at a time: hits and shadow rays are the same."""
+    if not traces_in_blocks(device):
+        pytest.skip("blocks are for PoCL's compiler")
+    scene = SCENES[name].scene if name in SCENES else _among_balls()
+    blocks, single = Tracer(device, scene, in_blocks=True), Tracer(device, scene, in_blocks=False)
+    first = camera_rays(scene.camera, (75, 51))  # blocks are not full
+    distances = single.place(first).result()
+    assert np.isfinite(distances).mean() > 0.3
+    for rays_ in (first, scattered_rays(first, distances, 3000, 1), shadow_rays(scene, first, distances, 2)):
+        expected = single.place(rays_).result()
+        assert len(np.unique(expected)) > 1
+        np.testing.assert_allclose(blocks.place(rays_).result(), expected, rtol=2e-6)
 
 
 def test_rays_beside_embree(tmp_path: Path, device: Device) -> None:

@@ -179,6 +179,7 @@ def check_tree(tree: bvh.Bvh, face_boxes: Floats, is_mesh: bool) -> int:
         visited, deepest = visited + 1, max(deepest, depth)
         assert tree.levels[depth - 1] <= index < tree.levels[depth]
         node = tree.nodes[index]
+        check_order(node)
         for child, reference in enumerate(node["child"]):
             box = node["bounds"][:, child].reshape(3, 2).T
             if reference == layout.NODE_EMPTY:
@@ -198,6 +199,19 @@ def check_tree(tree: bvh.Bvh, face_boxes: Floats, is_mesh: bool) -> int:
     assert sorted(found) == list(range(len(face_boxes)))
     assert deepest == len(tree.levels) - 1 <= layout.BVH_MAX_DEPTH
     return deepest
+
+
+def check_order(node: np.void) -> None:
+    """Every child has its place in the order of each octant; those that are farther along it come first."""
+    used = node["child"] != layout.NODE_EMPTY
+    centers = node["bounds"].reshape(3, 2, -1)[:, :, used].astype(np.float64).mean(axis=1)
+    depth = np.full(layout.BVH_WIDTH, np.inf)
+    for octant, order in enumerate(node["order"]):
+        children = (int(order) >> 3 * np.arange(layout.BVH_WIDTH)) & 7
+        assert sorted(children) == list(range(layout.BVH_WIDTH))
+        depth[used] = [-1 if octant >> axis & 1 else 1 for axis in range(3)] @ centers
+        along = depth[children][used[children]]
+        assert (np.diff(along) <= 1e-5 * (np.abs(centers).max() + 1e-30)).all()
 
 
 def face_boxes(mesh: scene.Mesh) -> Floats:

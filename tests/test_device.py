@@ -14,9 +14,11 @@ from small_scenes import mixed_scene
 from incpt import device as device_module
 from incpt import layout, pocl
 from incpt.device import DEVICE_VARIABLE, Device, all_devices, choose, device_name, source
+from incpt.device_scene import DeviceScene
 from incpt.errors import DeviceError, InputError
 from incpt.scene import Image
 from incpt.session import Session
+from incpt.wavefront import traces_in_blocks
 
 
 def test_choice_by_index_name_and_variable(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -175,6 +177,21 @@ def test_blocks_and_wavefront_agree(device: Device) -> None:
         images.append(session.image())
     assert np.median(np.abs(images[0] - images[1])) < 1e-5
     assert images[0].mean() == pytest.approx(images[1].mean(), rel=1e-3)
+
+
+def test_blocks_are_the_same_without_instructions_of_avx512(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not traces_in_blocks(device):
+        pytest.skip("blocks are for PoCL's compiler")
+    images = []
+    for _ in range(2):
+        session = Session(mixed_scene(base_nor=8), device=device)
+        session.render(8)
+        images.append(session.image())
+        portable = (*session._device_scene.variant, "PORTABLE_LANES")
+        monkeypatch.setattr(DeviceScene, "variant", portable)
+    np.testing.assert_allclose(images[0], images[1], rtol=1e-5)
 
 
 def test_devices_agree(device: Device) -> None:
