@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from rich.table import Table
 
-from incpt.benchmarks import build, latency, rays, scale, sweep, table51
+from incpt.benchmarks import build, latency, rays, scale, steps, sweep, table51
 from incpt.benchmarks.peers import compare
 from incpt.benchmarks.store import Results, Row
 
@@ -41,6 +41,7 @@ EXPERIMENTS = {
     scale.NAME: Experiment(
         "How cost grows", lambda results: [scale.table(results)], ("size", "max_bounces", "least_s")
     ),
+    steps.NAME: Experiment("Steps: host and device, and repetition", steps.tables),
     latency.NAME: Experiment(
         "How soon the editor answers", lambda results: [latency.table(results)], ("size",)
     ),

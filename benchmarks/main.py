@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import typer
 
-from incpt.benchmarks import build, latency, rays, report, scale, screenshots, soak, sweep, table51
+from incpt.benchmarks import build, latency, rays, report, scale, screenshots, soak, steps, sweep, table51
 from incpt.benchmarks.peers import compare
 from incpt.errors import InputError
 
@@ -25,6 +25,7 @@ app.command("rays")(rays.rays)
 app.command("peers")(compare.peers)
 app.command("build")(build.build)
 app.command("scale")(scale.scale)
+app.command("steps")(steps.steps)
 app.command("latency")(latency.latency)
 app.command("soak")(soak.soak)
 app.command("screenshots")(screenshots.screenshots)

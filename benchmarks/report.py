@@ -15,7 +15,7 @@ import typer
 from rich.table import Table
 
 from incpt import files
-from incpt.benchmarks import build, options, plots, rays, scale, store, sweep, table51, tables
+from incpt.benchmarks import build, options, plots, rays, scale, steps, store, sweep, table51, tables
 from incpt.benchmarks.catalogue import EXPERIMENTS, setup_text
 from incpt.benchmarks.fit import fitted
 from incpt.benchmarks.peers import compare
@@ -177,6 +177,14 @@ def _scale(results: Results) -> Iterable[str]:
             yield _figure(plots.lines({axis.name: points}, axis.what, label, axis.name, laws))
 
 
+def _steps(results: Results) -> Iterable[str]:
+    groups: dict[str, dict[str, Summary]] = {}
+    for (scene, mode), rates in steps.repetition_rates(results).items():
+        groups.setdefault(scene, {})[mode] = summary(rates)
+    if groups:
+        yield _figure(plots.bars(groups, "million paths per second", "over the same tiles"))
+
+
 _PLOTS: dict[str, Callable[[Results], Iterable[str]]] = {
     table51.NAME: _table51,
     sweep.NAME: _sweep,
@@ -184,6 +192,7 @@ _PLOTS: dict[str, Callable[[Results], Iterable[str]]] = {
     rays.NAME: _rays,
     build.NAME: _build,
     scale.NAME: _scale,
+    steps.NAME: _steps,
 }
 
 

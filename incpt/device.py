@@ -97,11 +97,11 @@ class Device:
                 self._kernels[kernel_name, features] = cl.Kernel(program, kernel_name)
         return self._kernels[name, features]
 
-    def launch(self, kernel: cl.Kernel, size: int, *args: Any, work_group: int | None = None) -> None:
+    def launch(self, kernel: cl.Kernel, size: int, *args: Any, work_group: int | None = None) -> cl.Event:
         """Enqueue `size` work-items, rounded up to whole groups; args are buffers and numpy scalars."""
         group = work_group or self.tuning.work_group
         try:
-            kernel(self.queue, (-(-size // group) * group,), (group,), *args)
+            return kernel(self.queue, (-(-size // group) * group,), (group,), *args)
         except cl.Error as error:
             raise DeviceError(_explain(error, f"kernel {kernel.function_name}")) from error
 

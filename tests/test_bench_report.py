@@ -251,11 +251,14 @@ def test_report_of_every_experiment(tmp_path: Path) -> None:
     for count in (10, 100):
         add("build", {"measure": "top", "objects": count}, {"ms": count**0.5, "count": count})
         add("scale", {"axis": "lights", "value": count}, {"step_ms": count**0.5})
+    for mode, rate in (("BASE", 2e6), ("INCREMENTAL", 3e6)):
+        subject = {"measure": "repetition", "scene": "s", "mode": mode}
+        add("steps", subject, {"paths_per_second": rate})
     text = report.page(tmp_path)
     page = parsed(text)
     assert page.headings == [name for name in EXPERIMENTS if name not in ("table51", "latency")]
-    # Errors by steps and by seconds; rays; rate, error and latency of renderers; trees; lamps.
-    assert text.count("<svg") == 2 + 1 + 3 + 1 + 1
+    # Errors by steps and by seconds; rays; rate, error and latency of renderers; trees; lamps; repetition.
+    assert text.count("<svg") == 2 + 1 + 3 + 1 + 1 + 1
     assert "turn &amp; move" in text and "<b>turn & move" not in text
     assert text.count("n^0.50") >= 2
     assert "<b>million rays per second</b>" in text

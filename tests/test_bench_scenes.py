@@ -77,6 +77,10 @@ class FakePeer:
         self.log.append(f"move {position[0]:.2f}")
         return 0.005
 
+    def first_tiles(self, name: str, position: Vector, seed: int) -> float:
+        assert self.name == "incpt", "only incpt keeps its picture"
+        return 0.001
+
     def close(self) -> None:
         self.log.append("close")
 
@@ -135,6 +139,12 @@ def test_peers_are_checked_then_timed(
     assert made["mitsuba scalar_rgb"].log == ["close"]
     titles = [str(table.title) for table in compare.tables(results)]
     assert titles == ["million camera paths per second", "relMSE x seconds", "edit to first picture, ms"]
+    latency = compare.tables(results)[2]
+    rows = list(zip(*(list(column.cells) for column in latency.columns), strict=True))
+    assert rows[-2:] == [
+        ("incpt, kept picture with the first tiles anew", "1.00 ±0 %"),
+        ("that to the best other", "5.00 x"),
+    ]
 
 
 def test_finished_comparison_starts_nobody(
@@ -175,6 +185,7 @@ def test_incpt_as_a_worker() -> None:
         assert worker.time(2, seed=4) > 0
         x, y, z = bench.scene.object("tall").position
         assert 0 < worker.move("tall", (x + 0.1, y, z), seed=5) < 30
+        assert 0 < worker.first_tiles("tall", (x, y, z), seed=5) < 30
         with pytest.raises(MissingPeer, match="no such thing"):
             worker.move("no such thing", (0, 0, 0), seed=5)
         # Neither a mistake nor Ctrl-C, which reaches the whole group, ends it.

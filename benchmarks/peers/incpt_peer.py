@@ -12,6 +12,9 @@ from incpt.session import Session
 from incpt.settings import RenderSettings
 
 _MOST_SAMPLES_PER_STEP = 16
+_DRAG_NOR = 16
+"""Repetitions of a tile in a drag, as the editor has it by default."""
+_FIRST_TILES = 4
 
 
 class IncptPeer:
@@ -50,6 +53,23 @@ class IncptPeer:
         session.step()
         session.image()
         return time.perf_counter() - began
+
+    def first_tiles(self, name: str, position: Vector, seed: int) -> float:
+        """Put an object elsewhere, as a step of a drag; seconds until the kept picture shows the tiles
+        nearest to it as they are now, with as many samples as they get in a drag."""
+        session = self._prepared(_DRAG_NOR, seed)
+        session.configure(replace(session.settings, sample_rate=1, strategy="spiral", nor=_DRAG_NOR))
+        session.render(_DRAG_NOR)
+        scene = session.scene.with_object(name, position=position)
+        began = time.perf_counter()
+        session.edit(scene)
+        finished = 0
+        while finished == 0:
+            finished = len(session.step(_FIRST_TILES * _DRAG_NOR).tiles)
+        session.image()
+        seconds = time.perf_counter() - began
+        session.configure(replace(session.settings, strategy="restart"))
+        return seconds
 
     def _prepared(self, spp: int, seed: int) -> Session:
         assert self._session is not None

@@ -50,6 +50,10 @@ class Worker:
     def move(self, name: str, position: Vector, seed: int) -> float:
         return float(self._ask("move", name, position, seed))
 
+    def first_tiles(self, name: str, position: Vector, seed: int) -> float:
+        """Of incpt alone; see IncptPeer."""
+        return float(self._ask("first_tiles", name, position, seed))
+
     def close(self) -> None:
         """End the process."""
         self._pipe.close()
