@@ -17,7 +17,8 @@
 
 #define SWEEP_WIDTH 16
 
-// Without AVX-512 clang warns that float16 is passed otherwise than with it; nothing is passed to other programs.
+// Without AVX-512 clang warns that float16 is passed otherwise than with it; nothing is passed to other
+// programs.
 #ifdef __clang__
 #pragma clang diagnostic ignored "-Wpsabi"
 #endif
