@@ -10,6 +10,8 @@
 // directional albedo of the layer, tabulated per material by albedo.py: what the layer reflects does not
 // reach the base, in both directions, so that a white base under a lossless layer reflects exactly
 // everything and the whole stays reciprocal (Kelemen and Szirmay-Kalos 2001).
+//
+// The variant MATT serves scenes without metals and layers: rho / pi is left.
 
 typedef struct {
     Vec3 base;    // albedo of the Lambertian part, without the layer's share
@@ -67,6 +69,24 @@ INLINE float specular_probability(const Surface *s, float layer_wo) {
     return both ? CLAMP(share, 0.1f, 0.9f) : (diffuse > 0.0f ? 0.0f : 1.0f);
 }
 
+#ifdef MATT
+INLINE BsdfValue eval_surface(const Surface *s, Vec3 wo, Vec3 wi) {
+    int above = (wo.z > 0.0f) & (wi.z > 0.0f);
+    float cosine = above ? wi.z : 0.0f;
+    BsdfValue result;
+    result.f_cos = scaled(cosine * INV_PI, s->base);
+    result.pdf = cosine * INV_PI;
+    return result;
+}
+
+INLINE BsdfSample sample_surface(const Surface *s, Vec3 wo, Uniform2 direction, float lobe) {
+    BsdfSample result;
+    result.wi = sample_cosine_hemisphere(direction.u, direction.v);
+    result.pdf = wo.z > 0.0f ? result.wi.z * INV_PI : 0.0f;
+    result.weight = choose(result.pdf > 0.0f, s->base, vec3(0.0f, 0.0f, 0.0f));
+    return result;
+}
+#else
 INLINE BsdfValue eval_surface(const Surface *s, Vec3 wo, Vec3 wi) {
     float a2 = s->alpha * s->alpha;
     Vec3 h = unit(add(wo, wi));
@@ -106,3 +126,4 @@ INLINE BsdfSample sample_surface(const Surface *s, Vec3 wo, Uniform2 direction, 
         choose(valid, scaled(1.0f / (valid ? value.pdf : 1.0f), value.f_cos), vec3(0.0f, 0.0f, 0.0f));
     return result;
 }
+#endif

@@ -97,12 +97,13 @@ class DeviceScene:
     @property
     def variant(self) -> tuple[str, ...]:
         """What chooses the variants of all kernels that this scene needs: what there is, and what is left out
-        of describing a hit."""
+        of describing a hit and of shading."""
         names = {
             "MEDIA": self.has_media,
             "ALL_ON_TOP": self._all_on_top,
             "FLAT": self._flat,
             "SMOOTH_MEDIA": self.has_media and self._smooth_media,
+            "MATT": self._matt,
             "FEW_ON_TOP": 0 < self.top_pack_count <= _FEW_PACKS,
         }
         return (*self.features, *(name for name, holds in names.items() if holds))
@@ -258,6 +259,8 @@ class DeviceScene:
             layer[:] = albedo.layer_row(material)
         media = [material for material in materials if material.transmission > 0]
         self.has_media = bool(media)
+        # Where nothing lets all light through, or by chance none, the opaque surface is what counts.
+        self._matt = all(m.specular == m.metallic == 0 for m in materials if m.transmission < 1)
         self._smooth_media = all(material.roughness**2 <= layout.MIN_ALPHA for material in media)
         self._upload("materials", rows)
         self._upload("layers", layers)

@@ -13,10 +13,11 @@ from small_scenes import mixed_scene
 
 from incpt import device as device_module
 from incpt import layout, pocl
+from incpt.benchmarks.scenes import cornell
 from incpt.device import DEVICE_VARIABLE, Device, all_devices, choose, device_name, source
 from incpt.device_scene import DeviceScene
 from incpt.errors import DeviceError, InputError
-from incpt.scene import Image
+from incpt.scene import Image, Material, Scene
 from incpt.session import Session
 from incpt.wavefront import traces_in_blocks
 
@@ -194,6 +195,18 @@ def test_blocks_are_the_same_without_instructions_of_avx512(
     np.testing.assert_allclose(images[0], images[1], rtol=1e-5)
 
 
+def test_variant_for_matt_scenes_follows_materials(device: Device) -> None:
+    box = cornell()
+    session = Session(box, size=(8, 8), device=device)
+    assert "MATT" in session._device_scene.variant
+    clear = Material(transmission=1.0)  # opaque never, so that its layer does not count
+    session.edit(Scene(box.camera, box.environment, {**box.materials, "clear": clear}, box.objects))
+    assert "MATT" in session._device_scene.variant
+    for change in ({"specular": 0.5}, {"metallic": 1.0}, {"specular": 1.0, "transmission": 0.5}):
+        session.edit(box.with_material("white", **change))
+        assert "MATT" not in session._device_scene.variant
+
+
 def test_devices_agree(device: Device) -> None:
     """Every device makes the same picture, within rounding; where there is one only, with itself."""
     session = Session(mixed_scene(base_nor=16), device=device)
@@ -210,6 +223,8 @@ RESTRICTIONS = ("ALL_ON_TOP", "FEW_ON_TOP", "FLAT", "SMOOTH_MEDIA")
 VARIANTS = [
     *(lights + media for lights in ((), LIGHTS[:1], LIGHTS[1:], LIGHTS) for media in ((), ("MEDIA",))),
     ("MEDIA", *RESTRICTIONS),
+    (*LIGHTS, "MEDIA", "MATT"),
+    (*LIGHTS, *RESTRICTIONS[:3], "MATT"),
     (*LIGHTS, "MEDIA", *RESTRICTIONS),
     (*LIGHTS, *RESTRICTIONS[:3]),
     (*LIGHTS, *RESTRICTIONS[1:2]),

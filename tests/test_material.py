@@ -44,27 +44,29 @@ def _components(prefix: str, w: Array, count: int) -> dict[str, npt.NDArray[np.f
     return {prefix + axis: np.ascontiguousarray(row) for axis, row in zip("xyz", w, strict=True)}
 
 
-def evaluate(material: Material, wo: Array, wi: Array) -> tuple[Array, Array]:
+def evaluate(material: Material, wo: Array, wi: Array, features: tuple[str, ...] = ()) -> tuple[Array, Array]:
     """f cos (3, N) and pdf (N,) for directions (3,) or (3, N)."""
     count = max(np.reshape(wo, (3, -1)).shape[1], np.reshape(wi, (3, -1)).shape[1])
     body = _SURFACE + """BsdfValue b = eval_surface(&s, wo, vec3(ix[i], iy[i], iz[i]));
         r[i] = b.f_cos.x; g[i] = b.f_cos.y; b_[i] = b.f_cos.z; pdf[i] = b.pdf;"""  # fmt: skip
     r, g, b, pdf = call(
-        "material", body, count, ("r", "g", "b_", "pdf"), **_components("o", wo, count),
+        "material", body, count, ("r", "g", "b_", "pdf"), features, **_components("o", wo, count),
         **_components("i", wi, count), **_arguments(material),
     )  # fmt: skip
     return np.stack([r, g, b]), pdf
 
 
-def sample(material: Material, wo: Array, count: int, seed: int = 11) -> tuple[Array, Array, Array]:
+def sample(
+    material: Material, wo: Array, count: int, seed: int = 11, features: tuple[str, ...] = ()
+) -> tuple[Array, Array, Array]:
     """wi (3, N), weight (3, N), pdf (N,)."""
     u, v, lobe = uniforms(count, 3, seed)
     body = _SURFACE + """Uniform2 uv; uv.u = u[i]; uv.v = v[i];
         BsdfSample b = sample_surface(&s, wo, uv, lobe[i]); x[i] = b.wi.x; y[i] = b.wi.y; z[i] = b.wi.z;
         r[i] = b.weight.x; g[i] = b.weight.y; b_[i] = b.weight.z; pdf[i] = b.pdf;"""  # fmt: skip
     results = call(
-        "material", body, count, ("x", "y", "z", "r", "g", "b_", "pdf"), **_components("o", wo, count),
-        u=u, v=v, lobe=lobe, **_arguments(material),
+        "material", body, count, ("x", "y", "z", "r", "g", "b_", "pdf"), features,
+        **_components("o", wo, count), u=u, v=v, lobe=lobe, **_arguments(material),
     )  # fmt: skip
     return np.stack(results[:3]), np.stack(results[3:6]), results[6]
 
@@ -226,3 +228,19 @@ def test_no_material_reflects_more_than_arrives() -> None:
             specular=float(rng.random()), ior=float(1 + 2 * rng.random()),
         )  # fmt: skip
         assert integral(material, float(88 * rng.random())).max() < 1.01
+
+
+@pytest.mark.parametrize("angle_deg", [*ANGLES_DEG, 100.0])
+@pytest.mark.parametrize("name", ["lambert", "white lambert"])
+def test_variant_for_matt_scenes_is_the_same(name: str, angle_deg: float) -> None:
+    """Without a layer and metal, what the variant leaves out makes no difference."""
+    material, wo = MATERIALS[name], wo_at(angle_deg)
+    u, v = uniforms(COUNT // 16, 2, 5)
+    wi = direction(np.arccos(1 - 2 * u), 2 * np.pi * v)
+    for general, matt in zip(evaluate(material, wo, wi), evaluate(material, wo, wi, ("MATT",)), strict=True):
+        assert matt.any() == (angle_deg < 90)
+        np.testing.assert_allclose(matt, general, rtol=1e-5, atol=1e-7)
+    if angle_deg < 90:
+        pairs = zip(sample(material, wo, 4096), sample(material, wo, 4096, features=("MATT",)), strict=True)
+        for general, matt in pairs:
+            np.testing.assert_allclose(matt, general, rtol=1e-4, atol=1e-6)
