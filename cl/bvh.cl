@@ -286,7 +286,7 @@ INLINE bool bvh_keep(uint pack, uint lanes, const float8 distance, const float8 
 
 // Asks for a node or pack before it is needed: those of a large mesh lie in memory that is slow to answer.
 INLINE void bvh_prefetch(__global const Node *nodes, __global const TrianglePack *packs, uint reference) {
-#ifdef INCPT_POCL
+#ifdef CLANG_CPU
     const size_t place =
         reference & NODE_LEAF ? (size_t)(packs + (reference & ~NODE_LEAF)) : (size_t)(nodes + reference);
 #pragma unroll

@@ -5,7 +5,7 @@
 // a / b, exactly: the quotient of two 32-bit integers is farther from the next whole number than a double
 // rounds. There are no SIMD instructions that divide integers.
 INLINE uint quotient(uint a, uint b) {
-#ifdef INCPT_POCL
+#ifdef CLANG_CPU
     return (uint)((double)a / (double)b);
 #else
     return a / b;

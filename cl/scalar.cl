@@ -1,11 +1,13 @@
 // Scalar mathematics and three-vectors from which PoCL can still make SIMD lanes out of work-items.
 //
+// CLANG_CPU: PoCL or Intel's runtime on a CPU, which are made of clang, so that its intrinsics are at hand.
+//
 // PoCL does not inline OpenCL's built-in functions into a kernel, and one call left in a kernel keeps its
 // loop over work-items from being vectorised; so there compiler intrinsics and selects stand in for them.
 // Elsewhere the names mean the built-ins. Vec3 is a struct of scalars for the same reason: values of type
 // float3 are not vectorised over.
 
-#ifdef INCPT_POCL
+#ifdef CLANG_CPU
 #define SQRT(x) __builtin_sqrtf(x)
 #define FABS(x) __builtin_fabsf(x)
 #define FLOOR(x) __builtin_floorf(x)
@@ -20,7 +22,7 @@
 // A call that stays a call is not vectorised over either, and LLVM leaves large functions as calls. Not
 // static under PoCL: LLVM rewrites calls of static functions to leave out what it finds constant or unused,
 // and loses the note on the call that the iterations of a loop are independent.
-#ifdef INCPT_POCL
+#ifdef CLANG_CPU
 #define INLINE inline __attribute__((always_inline))
 #else
 #define INLINE static inline __attribute__((always_inline))

@@ -5,7 +5,7 @@
 
 // PoCL keeps the variables of a kernel for each work-item of a group apart; those of a function that is
 // called lie in one place, and stay in the nearest cache.
-#ifdef INCPT_POCL
+#ifdef CLANG_CPU
 #define TRACE_CALL static __attribute__((noinline))
 #else
 #define TRACE_CALL static inline

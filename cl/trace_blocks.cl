@@ -1,7 +1,7 @@
-// The path tracer for CPUs under PoCL: one kernel, in which every work-item takes a block of paths from the
-// camera to their ends. The stages are those of the wavefront, as loops over the block, so that its state
-// never leaves the nearest caches, and no list goes by way of the host. Where a stage is straight-line code,
-// LLVM runs the loop in SIMD lanes.
+// The path tracer for CPUs under PoCL and Intel's runtime: one kernel, in which every work-item takes a block
+// of paths from the camera to their ends. The stages are those of the wavefront, as loops over the block, so
+// that its state never leaves the nearest caches, and no list goes by way of the host. Where a stage is
+// straight-line code, LLVM runs the loop in SIMD lanes.
 //
 // After each ray the paths that hit something move together, so that the loops which follow go over
 // neighbours.

@@ -80,6 +80,12 @@ class Device:
     def is_pocl(self) -> bool:
         return "pocl" in self.cl_device.platform.version.lower()
 
+    @property
+    def is_clang_cpu(self) -> bool:
+        """Whether kernels are compiled for a CPU by a clang whose intrinsics and loop pragmas they may use:
+        that of PoCL, and that of Intel's runtime."""
+        return self.is_cpu and (self.is_pocl or "intel" in self.cl_device.platform.name.lower())
+
     @cached_property
     def tuning(self) -> Tuning:
         return _CPU if self.is_cpu else _GPU
@@ -158,7 +164,7 @@ class Device:
     def program_text(self, file: str, features: tuple[str, ...] = ()) -> str:
         """The whole source of cl/`file`.cl as this device builds it."""
         # The target is part of the source, so that a kernel cached for another processor is not taken.
-        names = [*features, *(["INCPT_POCL"] if self.is_pocl else [])]
+        names = [*features, *(["CLANG_CPU"] if self.is_clang_cpu else [])]
         defines = "".join(f"#define {name}\n" for name in names)
         return f"// target: {self.target}\n{defines}{layout.c_header()}\n{source(file)}"
 

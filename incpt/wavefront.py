@@ -33,13 +33,14 @@ _BLOCK_PLANES = (
     1, 1, 3,  # lists of places
     _SPARE_PLANES,
 )  # fmt: skip
+_BLOCK_BYTES = 4 * layout.BLOCK_STRIDE * sum(_BLOCK_PLANES)
 
 _Class = layout.PathClass
 
 
 def traces_in_blocks(device: Device) -> bool:
-    """Whether paths are traced in blocks, by one kernel that is made for PoCL's compiler on CPUs."""
-    return device.is_pocl and device.is_cpu
+    """Whether paths are traced in blocks, by one kernel that is made for compilers and caches of CPUs."""
+    return device.is_clang_cpu and device.cl_device.local_mem_size >= _BLOCK_BYTES
 
 
 def block_arguments(scene: DeviceScene) -> list[Any]:

@@ -30,7 +30,7 @@ def device() -> Device:
 
 @cache
 def _kernel(files: tuple[str, ...], text: str, features: tuple[str, ...]) -> cl.Kernel:
-    names = [*features, *(["INCPT_POCL"] if device().is_pocl else [])]
+    names = [*features, *(["CLANG_CPU"] if device().is_clang_cpu else [])]
     included: set[str] = set()
     code = "".join(source(file, included) for file in files if file not in included)
     defines = "".join(f"#define {name}\n" for name in names)

@@ -104,7 +104,7 @@ def _among_balls() -> Scene:
 def test_rays_in_blocks_meet_what_rays_of_a_wavefront_meet(name: str, device: Device) -> None:
     """Swept, several at a time through trees, and one at a time: hits and shadow rays are the same."""
     if not traces_in_blocks(device):
-        pytest.skip("blocks are for PoCL's compiler")
+        pytest.skip("no blocks on this device")
     scene = SCENES[name].scene if name in SCENES else _among_balls()
     blocks, single = Tracer(device, scene, in_blocks=True), Tracer(device, scene, in_blocks=False)
     first = camera_rays(scene.camera, (75, 51))  # blocks are not full
