@@ -41,7 +41,11 @@ EXPERIMENTS = {
     scale.NAME: Experiment(
         "How cost grows", lambda results: [scale.table(results)], ("size", "max_bounces", "least_s")
     ),
-    steps.NAME: Experiment("Steps: host and device, and repetition", steps.tables),
+    steps.NAME: Experiment(
+        "Steps: host and device, and repetition",
+        steps.tables,
+        ("steps", "close_size", "samples", "spiral_steps"),
+    ),
     latency.NAME: Experiment(
         "How soon the editor answers", lambda results: [latency.table(results)], ("size",)
     ),

@@ -3,7 +3,8 @@
 The host's share of a step is the part of its wall time in which no kernel runs; the device tells when each
 began and ended. Repetition is measured on whole pictures that the moved object fills: the same tiles, samples
 and paths once pass after pass (BASE and REFINE), once tile after tile with all samples of a pixel together
-(INCREMENTAL).
+(INCREMENTAL). What order alone is worth is measured on the tiles that the spiral reaches first; see
+`path_order`.
 """
 
 from __future__ import annotations
@@ -23,6 +24,15 @@ from rich.table import Table
 from incpt.benchmarks import environment, experiment, options
 from incpt.benchmarks.content import digest
 from incpt.benchmarks.experiment import Outcome, Task, Work
+from incpt.benchmarks.path_order import (
+    COPIES,
+    ORDERS,
+    PASSES,
+    OrderedSession,
+    ordered_slots,
+    pixel_count,
+    spiral_tiles,
+)
 from incpt.benchmarks.scenes import SCENES
 from incpt.benchmarks.store import Results, Row, Store, grouped
 from incpt.benchmarks.tables import print_table
@@ -34,7 +44,7 @@ from incpt.session import Session
 from incpt.settings import RenderSettings
 
 NAME = "steps"
-OVERHEAD, REPETITION = "overhead", "repetition"
+OVERHEAD, REPETITION, ORDER = "overhead", "repetition", "order"
 SIZE = (960, 540)
 THESIS_SIZE = (1280, 720)
 """Size at which the thesis ran, with tiles of 16 and NoR 256: 60 steps a second (Falcor, RTX 2070 Super)."""
@@ -45,13 +55,23 @@ FULL_NOR = 256
 
 @dataclass(frozen=True)
 class Plan:
-    """What is measured: `steps` of each mode, and `samples` of each pixel of a picture of `close_size`."""
+    """What is measured: `steps` of each mode, `samples` of each pixel of a picture of `close_size`, and those
+    of the tiles that `spiral_steps` steps after an edit finish."""
 
     scenes: Sequence[str]
     steps: int = 12
     close_size: tuple[int, int] = (320, 180)
     samples: int = FULL_NOR
+    spiral_steps: int = 4
     repetitions: int = 5
+
+    def subject(self, name: str, **more: Any) -> Row:
+        """That of a measurement of a scene. All of the plan is in it, so that tables keep plans apart."""
+        return {
+            "scene": name, "content": digest(SCENES[name].scene), "steps": self.steps,
+            "close_size": list(self.close_size), "samples": self.samples, "spiral_steps": self.spiral_steps,
+            **more,
+        }  # fmt: skip
 
 
 class ProfiledDevice(Device):
@@ -94,7 +114,8 @@ def close_up(scene: Scene, name: str) -> Scene:
 
 
 def tasks(device: ProfiledDevice, plan: Plan) -> list[Task]:
-    """For each scene: steps of every mode, then both ways to take the samples of the same tiles, in turns."""
+    """For each scene: steps of every mode, then both ways to take the samples of the same tiles, and the
+    orders of paths, in turns."""
     made = []
     for name in plan.scenes:
         for size in (SIZE, THESIS_SIZE):
@@ -102,6 +123,8 @@ def tasks(device: ProfiledDevice, plan: Plan) -> list[Task]:
                 made.append(_overhead(device, plan, name, size, turn))
         for turn, mode in interleaved((Mode.BASE, Mode.INCREMENTAL), plan.repetitions):
             made.append(_repetition(device, plan, name, mode, turn))
+        for turn, order in interleaved(ORDERS, plan.repetitions):
+            made.append(_order(device, plan, name, order, turn))
     return made
 
 
@@ -110,10 +133,6 @@ def _settings(name: str, size: tuple[int, int], nor: int = FULL_NOR) -> RenderSe
     return RenderSettings(
         size=size, max_bounces=bench.max_bounces, transmission_bounces=bench.transmission_bounces, nor=nor
     )
-
-
-def _subject(name: str, **more: Any) -> Row:
-    return {"scene": name, "content": digest(SCENES[name].scene), **more}
 
 
 def _overhead(device: ProfiledDevice, plan: Plan, name: str, size: tuple[int, int], turn: int) -> Task:
@@ -132,14 +151,14 @@ def _overhead(device: ProfiledDevice, plan: Plan, name: str, size: tuple[int, in
                 work.check(len(rows) / (3 * plan.steps))
         return Outcome(rows=rows)
 
-    subject = _subject(name, measure=OVERHEAD, size=list(size), steps=plan.steps, repetition=turn)
+    subject = plan.subject(name, measure=OVERHEAD, size=list(size), repetition=turn)
     return Task(f"{name}: steps at {size[0]} x {size[1]}", subject, measure, 2.0)
 
 
 def _ways_into(session: Session, moves: str) -> list[tuple[Mode, Callable[[], None]]]:
     """Each mode with what brings the session there. REFINE follows the one step that is BASE."""
     scene = session.scene
-    turned = scene.with_object(moves, rotation=(0.0, 1.0, 0.0))
+    turned = _turned(scene, moves)
 
     def refine() -> None:
         while session.mode is not Mode.REFINE:
@@ -150,6 +169,10 @@ def _ways_into(session: Session, moves: str) -> list[tuple[Mode, Callable[[], No
         session.edit(turned if session.scene == scene else scene)
 
     return [(Mode.BASE, session.restart), (Mode.REFINE, refine), (Mode.INCREMENTAL, edit)]
+
+
+def _turned(scene: Scene, name: str) -> Scene:
+    return scene.with_object(name, rotation=(0.0, 1.0, 0.0))
 
 
 def _step(session: Session, device: ProfiledDevice) -> Row:
@@ -172,15 +195,12 @@ def _repetition(device: Device, plan: Plan, name: str, mode: Mode, turn: int) ->
         if mode is Mode.BASE:
             session.restart()
         else:
-            session.edit(scene.with_object(bench.moves, rotation=(0.0, 1.0, 0.0)))
+            session.edit(_turned(scene, bench.moves))
         work.timing_starts()
         seconds, paths = _all_samples(session, plan.samples, work)
         return Outcome({"paths": paths, "seconds": seconds, "paths_per_second": paths / seconds})
 
-    subject = _subject(
-        name, measure=REPETITION, size=list(plan.close_size), samples=plan.samples, mode=mode.name,
-        repetition=turn,
-    )  # fmt: skip
+    subject = plan.subject(name, measure=REPETITION, mode=mode.name, repetition=turn)
     return Task(f"{name}: {plan.samples} samples in {mode.name}", subject, measure, 2.0)
 
 
@@ -194,12 +214,34 @@ def _all_samples(session: Session, samples: int, work: Work) -> tuple[float, int
     return seconds, paths
 
 
+def _order(device: Device, plan: Plan, name: str, order: str, turn: int) -> Task:
+    def measure(work: Work) -> Outcome:
+        bench = SCENES[name]
+        session = OrderedSession(bench.scene, settings=_settings(name, SIZE, plan.samples), device=device)
+        session.build()
+        session.render(1)
+        session.edit(_turned(bench.scene, bench.moves))
+        tiles = spiral_tiles(session, plan.spiral_steps)
+        slots, slot_width_px = ordered_slots(order, session.grid, tiles, plan.samples)
+        session.trace_seconds(slots[: session.grid.count], slot_width_px)  # the kernel's first launch
+        work.check()
+        work.timing_starts()
+        seconds = session.trace_seconds(slots, slot_width_px)
+        # Those in the picture, which are the same for all orders.
+        paths = pixel_count(session.grid, tiles) * plan.samples
+        values = {"tiles": len(tiles), "paths": paths, "seconds": seconds}
+        return Outcome({**values, "paths_per_second": paths / seconds})
+
+    subject = plan.subject(name, measure=ORDER, size=list(SIZE), order=order, repetition=turn)
+    return Task(f"{name}: paths {order}", subject, measure)
+
+
 # ------------------------------------------------------------------------------------------ the tables
 
 
 def tables(results: Results) -> list[Table]:
-    """The host's share of steps, and what repetition gains."""
-    return [_overhead_table(results), _repetition_table(results)]
+    """The host's share of steps, what repetition gains, and what the order of paths is worth."""
+    return [_overhead_table(results), _repetition_table(results), _order_table(results)]
 
 
 def overhead(row: Row) -> float:
@@ -235,24 +277,47 @@ def _overhead_table(results: Results) -> Table:
 
 def repetition_rates(results: Results) -> dict[tuple[str, str], list[float]]:
     """Million paths per second of the repetitions by (scene, mode)."""
-    chosen = Results(results.environments, tuple(results.where(measure=REPETITION)))
-    found = grouped(chosen, lambda record: record.values["paths_per_second"] / 1e6, "scene", "mode")
-    return {(str(scene), str(mode)): rates for (scene, mode), rates in found.items()}
+    return _rates(results, REPETITION, "mode")
+
+
+def order_rates(results: Results) -> dict[tuple[str, str], list[float]]:
+    """Million paths per second of the repetitions by (scene, order)."""
+    return _rates(results, ORDER, "order")
+
+
+def _rates(results: Results, measure: str, way: str) -> dict[tuple[str, str], list[float]]:
+    chosen = Results(results.environments, tuple(results.where(measure=measure)))
+    found = grouped(chosen, lambda record: record.values["paths_per_second"] / 1e6, "scene", way)
+    return {(str(scene), str(name)): rates for (scene, name), rates in found.items()}
 
 
 def _repetition_table(results: Results) -> Table:
-    shown = Table(
-        title="million paths per second over the same tiles of a picture that the object fills",
-        title_justify="left", box=None, pad_edge=False,
-    )  # fmt: skip
+    columns = {
+        Mode.BASE.name: "BASE, pass after pass",
+        Mode.INCREMENTAL.name: "INCREMENTAL, tile after tile",
+    }
+    title = "million paths per second over the same tiles of a picture that the object fills"
+    return _rate_table(title, repetition_rates(results), columns, Mode.INCREMENTAL.name, Mode.BASE.name)
+
+
+def _order_table(results: Results) -> Table:
+    title = "million paths per second of the tiles that the spiral reaches first, by the order of paths"
+    return _rate_table(title, order_rates(results), {order: order for order in ORDERS}, COPIES, PASSES)
+
+
+def _rate_table(
+    title: str, rates: dict[tuple[str, str], list[float]], columns: dict[str, str], way: str, base: str
+) -> Table:
+    """A row for each scene: the rate of each of the ways in `columns`, and what `way` gains over `base`."""
+    shown = Table(title=title, title_justify="left", box=None, pad_edge=False)
     shown.add_column("scene")
-    for column in ("BASE, pass after pass", "INCREMENTAL, tile after tile", "gain"):
+    for column in (*columns.values(), "gain"):
         shown.add_column(column, justify="right")
-    rates = repetition_rates(results)
     for scene in dict.fromkeys(scene for scene, _ in rates):
-        ways = [rates.get((scene, mode.name)) for mode in (Mode.BASE, Mode.INCREMENTAL)]
-        texts = [summary(rate).text() if rate else "" for rate in ways]
-        gain = statistics.median(ways[1]) / statistics.median(ways[0]) if ways[0] and ways[1] else None
+        found = [rates.get((scene, name)) for name in columns]
+        faster, slower = rates.get((scene, way)), rates.get((scene, base))
+        gain = statistics.median(faster) / statistics.median(slower) if faster and slower else None
+        texts = [summary(rate).text() if rate else "" for rate in found]
         shown.add_row(scene, *texts, "" if gain is None else f"{significant(gain)} x")
     return shown
 
@@ -265,10 +330,10 @@ def steps(
     quick: options.QuickOption = False,
     device: options.DeviceOption = None,
 ) -> None:
-    """A step's cost beside its kernels, steps per second, and what repeating a tile gains."""
+    """A step's cost beside its kernels, steps per second, what repeating a tile gains, and order alone."""
     plan = Plan(options.chosen("--scene", scene, list(SCENES)))
     if quick:
-        plan = replace(plan, steps=5, close_size=(160, 90), repetitions=2)
+        plan = replace(plan, steps=5, close_size=(160, 90), spiral_steps=2, repetitions=2)
     plan = replace(plan, samples=samples or plan.samples, repetitions=repetitions or plan.repetitions)
     opened = ProfiledDevice(device)
     store = Store(output, NAME)
