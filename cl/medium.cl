@@ -67,12 +67,17 @@ INLINE float medium_ior(__global const Material *materials, uint medium) {
     return medium == MEDIUM_NONE ? 1.0f : ior;
 }
 
-// What a medium lets through over a distance in metres, which may be infinite (Beer and Lambert).
+// What a medium lets through over a distance in metres, which may be infinite (Beer and Lambert). The variant
+// CLEAR_MEDIA serves scenes whose media absorb nothing.
 INLINE Vec3 transmittance(__global const Material *materials, uint medium, float distance) {
+#ifdef CLEAR_MEDIA
+    return vec3(1.0f, 1.0f, 1.0f);
+#else
     int vacuum = medium == MEDIUM_NONE;
     __global const float *a = medium_material(materials, medium)->absorption;
     Vec3 depth = vec3(a[0] > 0.0f ? a[0] * distance : 0.0f, a[1] > 0.0f ? a[1] * distance : 0.0f,
                       a[2] > 0.0f ? a[2] * distance : 0.0f);
     depth = choose(vacuum, vec3(0.0f, 0.0f, 0.0f), depth);
     return vec3(exp_negative(-depth.x), exp_negative(-depth.y), exp_negative(-depth.z));
+#endif
 }

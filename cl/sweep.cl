@@ -63,17 +63,15 @@ INLINE float16 sweep_edge(const float16 ax, const float16 ay, const float16 bx, 
 }
 
 // Which rays meet a box between 0 and their limit, to be on the safe side; as bvh_boxes tells it of many
-// boxes and one ray. `inverse` is that of the direction, `least` the distance that counts as none, in the
-// axes of the rays.
-INLINE int16 sweep_box(__global const float *bounds, const uint *axes, const float16 *origin,
-                       const float16 *inverse, const float16 *least, float16 limit) {
+// boxes and one ray. `inverse` and the shifts are those of bvh_slab, in the axes of the rays.
+INLINE int16 sweep_box(__global const float *bounds, const uint *axes, const float16 *inverse,
+                       const float16 *near_shift, const float16 *far_shift, float16 limit) {
     float16 near = 0.0f, far = limit;
 #pragma unroll
     for (uint i = 0; i < 3; i++) {
-        const float16 a = (bounds[2 * axes[i]] - origin[i]) * inverse[i];
-        const float16 b = (bounds[2 * axes[i] + 1] - origin[i]) * inverse[i];
-        near = BVH_MAX8(BVH_MIN8(a, b) - least[i], near);
-        far = BVH_MIN8(BVH_MAX8(a, b) + least[i], far);
+        const float16 a = bounds[2 * axes[i]] * inverse[i], b = bounds[2 * axes[i] + 1] * inverse[i];
+        near = BVH_MAX8(BVH_MIN8(a, b) + near_shift[i], near);
+        far = BVH_MIN8(BVH_MAX8(a, b) + far_shift[i], far);
     }
     return near <= far * (1.0f + BVH_SLACK);
 }
@@ -84,7 +82,7 @@ static __attribute__((noinline)) WIDE void sweep_rays(const Sweep *sweep, uint f
     __local float *planes = sweep->planes + first;
     const uint x = axis == 2 ? 0 : axis + 1, y = axis == 0 ? 2 : axis - 1;
     const uint axes[3] = {x, y, axis};
-    float16 origin[3], shear[3], weight[3], inverse[3], least[3];
+    float16 origin[3], shear[3], weight[3], inverse[3], near_shift[3], far_shift[3];
 #pragma unroll
     for (uint i = 0; i < 3; i++) {
         origin[i] = sweep_load(planes + (SWEEP_ORIGIN + i) * BLOCK_STRIDE);
@@ -93,20 +91,27 @@ static __attribute__((noinline)) WIDE void sweep_rays(const Sweep *sweep, uint f
     }
     float16 limit = sweep_load(planes + SWEEP_LIMIT * BLOCK_STRIDE);
 #pragma unroll
-    for (uint i = 0; i < 2; i++) {
-        const int16 sign = as_int16(shear[i]) & INT_MIN;
-        const int16 zero = as_float16(as_int16(shear[i]) ^ sign) < BVH_ZERO;
-        inverse[i] = shear[2] / (zero ? as_float16(sign | as_int16((float16)(BVH_ZERO))) : shear[i]);
-        // Without a direction the ray lies between the planes or not; on a plane it counts as between.
-        least[i] = zero ? (float16)(BVH_INVERSE_ZERO * 1e-10f) : (float16)(0.0f);
+    for (uint i = 0; i < 3; i++) {
+        float16 along = 0.0f;
+        inverse[i] = shear[2];
+        if (i < 2) {
+            const int16 sign = as_int16(shear[i]) & INT_MIN;
+            const int16 zero = as_float16(as_int16(shear[i]) ^ sign) < BVH_ZERO;
+            inverse[i] /= zero ? as_float16(sign | as_int16((float16)(BVH_ZERO))) : shear[i];
+            // Without a direction the ray lies between the planes or not; on a plane it counts as between.
+            along = zero ? (float16)(BVH_INVERSE_ZERO * 1e-10f) : along;
+        }
+        const float16 shift = -origin[i] * inverse[i];
+        const float16 slack = BVH_MAX8(shift, -shift) * BVH_SLACK + along;
+        near_shift[i] = shift - slack;
+        far_shift[i] = shift + slack;
     }
-    inverse[2] = shear[2];
-    least[2] = 0.0f;
     uint16 place = NO_INDEX;
     uint waiting = 0;
     for (uint p = 0; p < sweep->pack_count; p++)
-        waiting |= (uint)sweep_any(sweep_box(sweep->bounds + 6 * p, axes, origin, inverse, least, limit))
-                   << p;
+        waiting |=
+            (uint)sweep_any(sweep_box(sweep->bounds + 6 * p, axes, inverse, near_shift, far_shift, limit))
+            << p;
     for (; waiting; waiting &= waiting - 1) {
         const uint p = BVH_FIRST_BIT(waiting);
         __global const TrianglePack *pack = sweep->packs + p;

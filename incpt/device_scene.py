@@ -103,6 +103,7 @@ class DeviceScene:
             "ALL_ON_TOP": self._all_on_top,
             "FLAT": self._flat,
             "SMOOTH_MEDIA": self.has_media and self._smooth_media,
+            "CLEAR_MEDIA": self.has_media and self._clear_media,
             "MATT": self._matt,
             "FEW_ON_TOP": 0 < self.top_pack_count <= _FEW_PACKS,
         }
@@ -261,6 +262,7 @@ class DeviceScene:
         self.has_media = bool(media)
         # Where nothing lets all light through, or by chance none, the opaque surface is what counts.
         self._matt = all(m.specular == m.metallic == 0 for m in materials if m.transmission < 1)
+        self._clear_media = not any(any(m.absorption) for m in media)
         self._smooth_media = all(material.roughness**2 <= layout.MIN_ALPHA for material in media)
         self._upload("materials", rows)
         self._upload("layers", layers)

@@ -13,7 +13,7 @@ from small_scenes import mixed_scene
 
 from incpt import device as device_module
 from incpt import layout, pocl
-from incpt.benchmarks.scenes import cornell
+from incpt.benchmarks.scenes import cornell, glass
 from incpt.device import DEVICE_VARIABLE, Device, all_devices, choose, device_name, source
 from incpt.device_scene import DeviceScene
 from incpt.errors import DeviceError, InputError
@@ -209,6 +209,22 @@ def test_variant_for_matt_scenes_follows_materials(device: Device) -> None:
         assert "MATT" not in session._device_scene.variant
 
 
+def test_variant_for_clear_media_follows_absorption(device: Device) -> None:
+    scene = glass()
+    session = Session(scene, size=(40, 24), device=device)
+    assert "CLEAR_MEDIA" in session._device_scene.variant
+    session.render(16)
+    clear = session.image()
+    # Next to nothing is absorbed, but the variant that could do it is taken.
+    session.edit(scene.with_material("glass", absorption=(1e-9, 0, 0)))
+    assert "CLEAR_MEDIA" not in session._device_scene.variant
+    session.restart()
+    session.render(16)
+    np.testing.assert_allclose(session.image(), clear, rtol=1e-4, atol=1e-5)
+    session.edit(cornell())
+    assert "CLEAR_MEDIA" not in session._device_scene.variant
+
+
 def test_devices_agree(device: Device) -> None:
     """Every device makes the same picture, within rounding; where there is one only, with itself."""
     session = Session(mixed_scene(base_nor=16), device=device)
@@ -225,7 +241,7 @@ RESTRICTIONS = ("ALL_ON_TOP", "FEW_ON_TOP", "FLAT", "SMOOTH_MEDIA")
 VARIANTS = [
     *(lights + media for lights in ((), LIGHTS[:1], LIGHTS[1:], LIGHTS) for media in ((), ("MEDIA",))),
     ("MEDIA", *RESTRICTIONS),
-    (*LIGHTS, "MEDIA", "MATT"),
+    (*LIGHTS, "MEDIA", "MATT", "CLEAR_MEDIA"),
     (*LIGHTS, *RESTRICTIONS[:3], "MATT"),
     (*LIGHTS, "MEDIA", *RESTRICTIONS),
     (*LIGHTS, *RESTRICTIONS[:3]),
