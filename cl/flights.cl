@@ -32,7 +32,7 @@
 #define FLIGHT_NEAR_SHIFT 3
 #define FLIGHT_FAR_SHIFT 6
 #define FLIGHT_SHEAR 9
-#define FLIGHT_HEADING 12 // octant, and four times two bits on: the largest component
+#define FLIGHT_HEADING 12 // octant in three bits, above them the largest component
 
 // A ray in the space of the tree that it is in, and that tree.
 typedef struct {

@@ -260,7 +260,7 @@ class DeviceScene:
             layer[:] = albedo.layer_row(material)
         media = [material for material in materials if material.transmission > 0]
         self.has_media = bool(media)
-        # Where nothing lets all light through, or by chance none, the opaque surface is what counts.
+        # Of a material that lets all light through no opaque surface is ever shaded.
         self._matt = all(m.specular == m.metallic == 0 for m in materials if m.transmission < 1)
         self._clear_media = not any(any(m.absorption) for m in media)
         self._smooth_media = all(material.roughness**2 <= layout.MIN_ALPHA for material in media)
