@@ -7,7 +7,7 @@
 // of the time is spent waiting for that, for memory, or for a branch that was guessed wrong to be told so. A
 // few rays that take turns, a node or pack each, keep the processor busy meanwhile. For that a ray's turn
 // must end without a branch on what was just computed: it begins with one instead, on what is known since the
-// turn before.
+// turn before. Only a pack ends with one, whether anything in it is met, which is slower without.
 //
 //   turn: take the nearest child from the stack; test its boxes or triangles; push the boxes that are met
 //

@@ -80,7 +80,7 @@ INLINE int16 sweep_box(__global const float *bounds, const uint *axes, const flo
 // directions.
 static __attribute__((noinline)) WIDE void sweep_rays(const Sweep *sweep, uint first, uint axis) {
     __local float *planes = sweep->planes + first;
-    const uint x = axis == 2 ? 0 : axis + 1, y = axis == 0 ? 2 : axis - 1;
+    const uint x = bvh_x_axis(axis), y = bvh_y_axis(axis);
     const uint axes[3] = {x, y, axis};
     float16 origin[3], shear[3], weight[3], inverse[3], near_shift[3], far_shift[3];
 #pragma unroll
@@ -92,22 +92,22 @@ static __attribute__((noinline)) WIDE void sweep_rays(const Sweep *sweep, uint f
     float16 limit = sweep_load(planes + SWEEP_LIMIT * BLOCK_STRIDE);
 #pragma unroll
     for (uint i = 0; i < 3; i++) {
-        float16 along = 0.0f;
+        float16 least = 0.0f;
         inverse[i] = shear[2];
         if (i < 2) {
             const int16 sign = as_int16(shear[i]) & INT_MIN;
             const int16 zero = as_float16(as_int16(shear[i]) ^ sign) < BVH_ZERO;
             inverse[i] /= zero ? as_float16(sign | as_int16((float16)(BVH_ZERO))) : shear[i];
             // Without a direction the ray lies between the planes or not; on a plane it counts as between.
-            along = zero ? (float16)(BVH_INVERSE_ZERO * 1e-10f) : along;
+            least = zero ? (float16)(BVH_INVERSE_ZERO * 1e-10f) : least;
         }
         const float16 shift = -origin[i] * inverse[i];
-        const float16 slack = BVH_MAX8(shift, -shift) * BVH_SLACK + along;
+        const float16 slack = BVH_MAX8(shift, -shift) * BVH_SLACK + least;
         near_shift[i] = shift - slack;
         far_shift[i] = shift + slack;
     }
     uint16 place = NO_INDEX;
-    uint waiting = 0;
+    uint waiting = 0; // a bit for each pack: there are few
     for (uint p = 0; p < sweep->pack_count; p++)
         waiting |=
             (uint)sweep_any(sweep_box(sweep->bounds + 6 * p, axes, inverse, near_shift, far_shift, limit))
@@ -151,7 +151,7 @@ static __attribute__((noinline)) WIDE void sweep_rays(const Sweep *sweep, uint f
 INLINE void sweep_prepare(const Sweep *sweep, uint place, __local const float *ray, uint path, uint axis,
                           float limit) {
     __local float *planes = sweep->planes + place;
-    const uint x = axis == 2 ? 0 : axis + 1, y = axis == 0 ? 2 : axis - 1;
+    const uint x = bvh_x_axis(axis), y = bvh_y_axis(axis);
     __local const float *direction = ray + 3 * BLOCK_STRIDE;
     const float inverse = 1.0f / direction[axis * BLOCK_STRIDE + path];
     planes[(SWEEP_ORIGIN + 0) * BLOCK_STRIDE] = ray[x * BLOCK_STRIDE + path];
@@ -165,8 +165,5 @@ INLINE void sweep_prepare(const Sweep *sweep, uint place, __local const float *r
 
 // The largest component of a path's ray.
 INLINE uint sweep_axis(__local const float *ray, uint path) {
-    __local const float *direction = ray + 3 * BLOCK_STRIDE + path;
-    const float x = FABS(direction[0]), y = FABS(direction[BLOCK_STRIDE]),
-                z = FABS(direction[2 * BLOCK_STRIDE]);
-    return x > y ? (x > z ? 0u : 2u) : (y > z ? 1u : 2u);
+    return bvh_main_axis(load3(ray + 3 * BLOCK_STRIDE, BLOCK_STRIDE, path));
 }
