@@ -28,13 +28,13 @@
 #define SWEEP_SHEAR 3
 #define SWEEP_LIMIT 6 // then the distance
 #define SWEEP_WEIGHT 7
-#define SWEEP_PLACE 10 // as HIT_TRIANGLE has it
+#define SWEEP_PLACE 10 // of the facet
 #define SWEEP_PLANES 11
 
 typedef struct {
-    __global const TrianglePack *packs;
-    __global const float *bounds; // of each pack: least and greatest x, y and z
-    uint pack_count;
+    __global const Facet *facets;
+    __global const Cluster *clusters;
+    uint cluster_count; // at most 32, of which rays meet the last without asking for its box
     __local float *planes;
 } Sweep;
 
@@ -76,75 +76,105 @@ INLINE int16 sweep_box(__global const float *bounds, const uint *axes, const flo
     return near <= far * (1.0f + BVH_SLACK);
 }
 
-// Tests sixteen rays, from place `first` on, against all triangles; `axis` is the largest of their
-// directions.
-static __attribute__((noinline)) WIDE void sweep_rays(const Sweep *sweep, uint first, uint axis) {
-    __local float *planes = sweep->planes + first;
-    const uint x = bvh_x_axis(axis), y = bvh_y_axis(axis);
-    const uint axes[3] = {x, y, axis};
-    float16 origin[3], shear[3], weight[3], inverse[3], near_shift[3], far_shift[3];
-#pragma unroll
-    for (uint i = 0; i < 3; i++) {
-        origin[i] = sweep_load(planes + (SWEEP_ORIGIN + i) * BLOCK_STRIDE);
-        shear[i] = sweep_load(planes + (SWEEP_SHEAR + i) * BLOCK_STRIDE);
-        weight[i] = 0.0f;
+// Sixteen rays in the axes of the test, and the nearest facets that they have met so far.
+typedef struct {
+    float16 origin[3], shear[3];
+    float16 limit, weight[3];
+    uint16 place;
+} SweepGroup;
+
+// Twice the signed area between the ray and an edge, from one corner of a facet to the next.
+#define SWEEP_EDGE(from, to) sweep_edge(to##x, to##y, from##x, from##y)
+
+// Tests the rays against a parallelogram, or a triangle. Of both the weights of the corners A, B and C are
+// kept: in the other half of a parallelogram that of B is negative.
+INLINE void sweep_facet(SweepGroup *group, __global const Facet *facet, uint index, const uint *axes,
+                        const bool triangle) {
+    __global const float *vertex = facet->vertex;
+#define SWEEP_CORNER(name, corner)                                                                           \
+    const float16 name##z = vertex[3 * corner + axes[2]] - group->origin[2];                                 \
+    const float16 name##x = (vertex[3 * corner + axes[0]] - group->origin[0]) - group->shear[0] * name##z;   \
+    const float16 name##y = (vertex[3 * corner + axes[1]] - group->origin[1]) - group->shear[1] * name##z;
+    SWEEP_CORNER(a, 0)
+    SWEEP_CORNER(b, 1)
+    SWEEP_CORNER(c, 2)
+    const float16 u = SWEEP_EDGE(b, c), v = SWEEP_EDGE(c, a), w = SWEEP_EDGE(a, b);
+    float16 lowest = BVH_MIN8(u, w), highest = BVH_MAX8(u, w);
+    if (triangle) {
+        lowest = BVH_MIN8(lowest, v);
+        highest = BVH_MAX8(highest, v);
+    } else {
+        SWEEP_CORNER(d, 3)
+        const float16 cd = SWEEP_EDGE(c, d), da = SWEEP_EDGE(d, a);
+        lowest = BVH_MIN8(lowest, BVH_MIN8(cd, da));
+        highest = BVH_MAX8(highest, BVH_MAX8(cd, da));
     }
-    float16 limit = sweep_load(planes + SWEEP_LIMIT * BLOCK_STRIDE);
+    const float16 determinant = u + v + w, depth = (u * az + v * bz + w * cz) * group->shear[2];
+    // Divided before it is compared: what waits for the facet before is the comparison alone. A determinant
+    // of 0 fails one of them.
+    const float16 distance = depth / determinant;
+    const int16 met = ((lowest >= 0.0f) | (highest <= 0.0f)) & (distance > 0.0f) & (distance < group->limit);
+    group->limit = met ? distance : group->limit;
+    group->weight[0] = met ? u : group->weight[0];
+    group->weight[1] = met ? v : group->weight[1];
+    group->weight[2] = met ? w : group->weight[2];
+    group->place = met ? (uint16)(index) : group->place;
+}
+
+// The clusters, a bit for each, whose boxes some ray of the group meets, and the last.
+INLINE uint sweep_clusters(const Sweep *sweep, const SweepGroup *group, const uint *axes) {
+    float16 inverse[3], near_shift[3], far_shift[3];
 #pragma unroll
     for (uint i = 0; i < 3; i++) {
         float16 least = 0.0f;
-        inverse[i] = shear[2];
+        inverse[i] = group->shear[2];
         if (i < 2) {
-            const int16 sign = as_int16(shear[i]) & INT_MIN;
-            const int16 zero = as_float16(as_int16(shear[i]) ^ sign) < BVH_ZERO;
-            inverse[i] /= zero ? as_float16(sign | as_int16((float16)(BVH_ZERO))) : shear[i];
+            const int16 sign = as_int16(group->shear[i]) & INT_MIN;
+            const int16 zero = as_float16(as_int16(group->shear[i]) ^ sign) < BVH_ZERO;
+            inverse[i] /= zero ? as_float16(sign | as_int16((float16)(BVH_ZERO))) : group->shear[i];
             // Without a direction the ray lies between the planes or not; on a plane it counts as between.
             least = zero ? (float16)(BVH_INVERSE_ZERO * 1e-10f) : least;
         }
-        const float16 shift = -origin[i] * inverse[i];
+        const float16 shift = -group->origin[i] * inverse[i];
         const float16 slack = BVH_MAX8(shift, -shift) * BVH_SLACK + least;
         near_shift[i] = shift - slack;
         far_shift[i] = shift + slack;
     }
-    uint16 place = NO_INDEX;
-    uint waiting = 0; // a bit for each pack: there are few
-    for (uint p = 0; p < sweep->pack_count; p++)
-        waiting |=
-            (uint)sweep_any(sweep_box(sweep->bounds + 6 * p, axes, inverse, near_shift, far_shift, limit))
-            << p;
-    for (; waiting; waiting &= waiting - 1) {
-        const uint p = BVH_FIRST_BIT(waiting);
-        __global const TrianglePack *pack = sweep->packs + p;
-        for (uint lane = 0; lane < BVH_WIDTH && pack->face[lane] != NO_INDEX; lane++) {
-            const float16 az = pack->vertex[axis][lane] - origin[2];
-            const float16 bz = pack->vertex[3 + axis][lane] - origin[2];
-            const float16 cz = pack->vertex[6 + axis][lane] - origin[2];
-            const float16 ax = (pack->vertex[x][lane] - origin[0]) - shear[0] * az;
-            const float16 bx = (pack->vertex[3 + x][lane] - origin[0]) - shear[0] * bz;
-            const float16 cx = (pack->vertex[6 + x][lane] - origin[0]) - shear[0] * cz;
-            const float16 ay = (pack->vertex[y][lane] - origin[1]) - shear[1] * az;
-            const float16 by = (pack->vertex[3 + y][lane] - origin[1]) - shear[1] * bz;
-            const float16 cy = (pack->vertex[6 + y][lane] - origin[1]) - shear[1] * cz;
-            const float16 u = sweep_edge(cx, cy, bx, by), v = sweep_edge(ax, ay, cx, cy),
-                          w = sweep_edge(bx, by, ax, ay);
-            const float16 lowest = BVH_MIN8(BVH_MIN8(u, v), w), highest = BVH_MAX8(BVH_MAX8(u, v), w);
-            const float16 determinant = u + v + w, depth = (u * az + v * bz + w * cz) * shear[2];
-            // Divided before it is compared: what waits for the triangle before is the comparison alone.
-            // A determinant of 0 fails one of them.
-            const float16 distance = depth / determinant;
-            const int16 met = ((lowest >= 0.0f) | (highest <= 0.0f)) & (distance > 0.0f) & (distance < limit);
-            limit = met ? distance : limit;
-            weight[0] = met ? u : weight[0];
-            weight[1] = met ? v : weight[1];
-            weight[2] = met ? w : weight[2];
-            place = met ? (uint16)((p * BVH_WIDTH + lane) | NODE_PACK) : place;
-        }
+    const uint last = sweep->cluster_count - 1;
+    uint met = 1u << last;
+    for (uint i = 0; i < last; i++)
+        met |= (uint)sweep_any(
+                   sweep_box(sweep->clusters[i].bounds, axes, inverse, near_shift, far_shift, group->limit))
+               << i;
+    return met;
+}
+
+// Tests sixteen rays, from place `first` on, against all facets; `axis` is the largest of their directions.
+static __attribute__((noinline)) WIDE void sweep_rays(const Sweep *sweep, uint first, uint axis) {
+    __local float *planes = sweep->planes + first;
+    const uint axes[3] = {bvh_x_axis(axis), bvh_y_axis(axis), axis};
+    SweepGroup group;
+#pragma unroll
+    for (uint i = 0; i < 3; i++) {
+        group.origin[i] = sweep_load(planes + (SWEEP_ORIGIN + i) * BLOCK_STRIDE);
+        group.shear[i] = sweep_load(planes + (SWEEP_SHEAR + i) * BLOCK_STRIDE);
+        group.weight[i] = 0.0f;
     }
-    sweep_store(planes + SWEEP_LIMIT * BLOCK_STRIDE, limit);
+    group.limit = sweep_load(planes + SWEEP_LIMIT * BLOCK_STRIDE);
+    group.place = NO_INDEX;
+    for (uint waiting = sweep_clusters(sweep, &group, axes); waiting; waiting &= waiting - 1) {
+        __global const Cluster *cluster = sweep->clusters + BVH_FIRST_BIT(waiting);
+        uint i = cluster->first;
+        for (; i < cluster->first_triangle; i++)
+            sweep_facet(&group, sweep->facets + i, i, axes, false);
+        for (; i < cluster->end; i++)
+            sweep_facet(&group, sweep->facets + i, i, axes, true);
+    }
+    sweep_store(planes + SWEEP_LIMIT * BLOCK_STRIDE, group.limit);
 #pragma unroll
     for (uint i = 0; i < 3; i++)
-        sweep_store(planes + (SWEEP_WEIGHT + i) * BLOCK_STRIDE, weight[i]);
-    sweep_store(planes + SWEEP_PLACE * BLOCK_STRIDE, as_float16(place));
+        sweep_store(planes + (SWEEP_WEIGHT + i) * BLOCK_STRIDE, group.weight[i]);
+    sweep_store(planes + SWEEP_PLACE * BLOCK_STRIDE, as_float16(group.place));
 }
 
 // Makes the ray in planes `ray` of a path ready: origin and direction, BLOCK_STRIDE apart, x first.

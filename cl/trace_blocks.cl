@@ -84,17 +84,25 @@ STAGE void sort_by_axis(const Block *block, __local const float *rays, uint want
     }
 }
 
+// Of a parallelogram ABCD the sweep leaves the weights of A, B and C, where that of B is against the others
+// in the half ACD: as B is A + C - D, those of A, C and D follow.
 INLINE void keep_swept(const Sweep *sweep, const State *state, uint place, uint path) {
     __local const float *planes = sweep->planes + place;
-    uint triangle = as_uint(planes[SWEEP_PLACE * BLOCK_STRIDE]);
-    int met = triangle != NO_INDEX;
-    uint pack = met ? triangle & ~NODE_PACK : 0u;
-    uint object = sweep->packs[pack / BVH_WIDTH].object[pack % BVH_WIDTH];
+    uint index = as_uint(planes[SWEEP_PLACE * BLOCK_STRIDE]);
+    int met = index != NO_INDEX;
+    __global const Facet *facet = sweep->facets + (met ? index : 0u);
+    Vec3 weight = load3(planes + SWEEP_WEIGHT * BLOCK_STRIDE, BLOCK_STRIDE, 0);
+    float others = weight.x + weight.z;
+    int second = ((weight.y < 0.0f) & (others > 0.0f)) | ((weight.y > 0.0f) & (others < 0.0f));
+    weight = choose(second, vec3(weight.x + weight.y, weight.z + weight.y, -weight.y), weight);
+    uint triangle = second ? facet->place[1] : facet->place[0];
+    uint corner = second ? facet->turns >> 2 : facet->turns & 3u;
     state->hits[HIT_DISTANCE * BLOCK_STRIDE + path] = planes[SWEEP_LIMIT * BLOCK_STRIDE];
-    store_bits(state->hits, HIT_OBJECT * BLOCK_STRIDE + path, met ? object : NO_INDEX);
-    store_bits(state->hits, HIT_TRIANGLE * BLOCK_STRIDE + path, triangle);
-    store3(state->hits + HIT_POSITION_X * BLOCK_STRIDE, BLOCK_STRIDE, path,
-           load3(planes + SWEEP_WEIGHT * BLOCK_STRIDE, BLOCK_STRIDE, 0));
+    store_bits(state->hits, HIT_OBJECT * BLOCK_STRIDE + path, met ? facet->object : NO_INDEX);
+    store_bits(state->hits, HIT_TRIANGLE * BLOCK_STRIDE + path, met ? triangle : NO_INDEX);
+    Vec3 turned = choose(corner == 1u, vec3(weight.z, weight.x, weight.y), weight);
+    turned = choose(corner == 2u, vec3(weight.y, weight.z, weight.x), turned);
+    store3(state->hits + HIT_POSITION_X * BLOCK_STRIDE, BLOCK_STRIDE, path, turned);
 }
 
 // What the rays of the live paths meet of the top level.
@@ -370,8 +378,8 @@ INLINE void trace_block(const Block *block, uint first, uint count) {
         __global const float *environment_marginal, __global const float *environment_conditional,           \
         __global const float *environment_pdf, __local float *rays, __local float *paths,                    \
         __local float *hits, __local float *shadows, __local float *radiance, __local uint *list,            \
-        __local uint *escaped, __local uint *by_axis, __local float *spare,                                  \
-        __global const float *top_bounds, const uint top_pack_count
+        __local uint *escaped, __local uint *by_axis, __local float *spare, __global const Facet *facets,    \
+        __global const Cluster *clusters, const uint cluster_count
 
 #define BLOCK(params, slots)                                                                                 \
     {params,                                                                                                 \
@@ -379,7 +387,7 @@ INLINE void trace_block(const Block *block, uint first, uint count) {
      {top_nodes, top_packs, nodes, packs, objects, normals},                                                 \
      {materials, lights, environment_image, environment_marginal, environment_conditional, environment_pdf}, \
      layers,                                                                                                 \
-     {top_packs, top_bounds, top_pack_count, spare},                                                         \
+     {facets, clusters, cluster_count, spare},                                                               \
      {rays, paths, hits, shadows, radiance},                                                                 \
      (__local uint *)paths + PATH_RESULT * BLOCK_STRIDE,                                                     \
      list,                                                                                                   \

@@ -139,15 +139,6 @@ def _with_leaves(tree: Bvh, references: npt.NDArray[np.integer[Any]]) -> npt.NDA
     return nodes
 
 
-def pack_bounds(packs: npt.NDArray[np.void]) -> npt.NDArray[np.float32]:
-    """(P, 3, 2) least and greatest x, y and z of the triangles of each pack."""
-    vertices = packs["vertex"].reshape(-1, 3, 3, layout.BVH_WIDTH)
-    unused = np.isnan(vertices)
-    least = np.where(unused, np.float32(np.inf), vertices).min(axis=(1, 3))
-    greatest = np.where(unused, np.float32(-np.inf), vertices).max(axis=(1, 3))
-    return np.stack([least, greatest], axis=-1)
-
-
 def position_error(
     bounds: npt.NDArray[np.floating[Any]],
     world_from_object: npt.NDArray[np.float64],

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
-from incpt import albedo, bvh, layout, lights, transform
+from incpt import albedo, bvh, facets, layout, lights, transform
 from incpt.device import Device
 from incpt.scene import Change, Mesh, Object, Scene, Vector, diff
 
@@ -73,6 +73,7 @@ class DeviceScene:
         self.environment_probability = 0.0
         self._light_scale = 0.0
         self._trees: WeakKeyDictionary[Mesh, bvh.Bvh] = WeakKeyDictionary()
+        self._facets: WeakKeyDictionary[Mesh, facets.Facets] = WeakKeyDictionary()
         self._places: dict[Mesh, tuple[int, int, int]] = {}
         self._objects = _ObjectTable(
             (), np.zeros(0, layout.OBJECT), np.zeros((0, 2, 3)), np.zeros(0, np.bool_)
@@ -105,7 +106,7 @@ class DeviceScene:
             "SMOOTH_MEDIA": self.has_media and self._smooth_media,
             "CLEAR_MEDIA": self.has_media and self._clear_media,
             "MATT": self._matt,
-            "FEW_ON_TOP": 0 < self.top_pack_count <= _FEW_PACKS,
+            "FEW_ON_TOP": self._few_on_top,
         }
         return (*self.features, *(name for name, holds in names.items() if holds))
 
@@ -188,34 +189,53 @@ class DeviceScene:
         others = np.array([i for i in range(len(objects)) if i not in vertices], np.int64)
         bounds = self._objects.bounds[others]
         triangles = None
+        places: list[npt.NDArray[np.uint32]] = []
         if vertices:
-            firsts = np.cumsum([0, *(len(v) for v in vertices.values())])
-            faces = [objects[i].mesh.faces + first for i, first in zip(vertices, firsts, strict=False)]
-            triangles = bvh.build_triangles(
-                self.device, np.concatenate(list(vertices.values())), np.concatenate(faces).astype(np.int32)
-            )
-            face = triangles.packs["face"]
-            used = face != layout.NO_INDEX
-            counts = [len(f) for f in faces]
-            owner = np.repeat(np.array(list(vertices), np.uint32), counts)
-            own_face = np.concatenate([np.arange(n, dtype=np.uint32) for n in counts])
-            triangles.packs["object"][used] = owner[face[used]]
-            face[used] = own_face[face[used]]
-        self._upload("top_nodes", bvh.build_top_with_triangles(self.device, bounds, others, triangles))
-        self._upload(
-            "top_packs", triangles.packs if triangles is not None else np.zeros(1, layout.TRIANGLE_PACK)
-        )
+            triangles, places = self._triangles_on_top(vertices)
         self._all_on_top = len(others) == 0
-        self.top_pack_count = 0 if triangles is None else len(triangles.packs)
-        few = 0 < self.top_pack_count <= _FEW_PACKS
-        self._upload(
-            "top_bounds",
-            bvh.pack_bounds(triangles.packs) if few and triangles is not None else np.zeros(6, np.float32),
-        )
+        self._few_on_top = triangles is not None and len(triangles.packs) <= _FEW_PACKS
+        self._upload("top_nodes", bvh.build_top_with_triangles(self.device, bounds, others, triangles))
+        self._upload("top_packs", _joined([triangles.packs] if triangles else [], layout.TRIANGLE_PACK))
+        rows, clusters = np.zeros(1, layout.FACET), np.zeros(0, layout.CLUSTER)
         self._buffers["block_nodes"] = self._buffers["top_nodes"]
-        if few:
+        if triangles is not None and self._few_on_top:
             # Blocks of paths meet those triangles without a tree, and take it for the other objects alone.
+            parts = [
+                facets.Part(self._facets_of(objects[i].mesh), own, i, place)
+                for (i, own), place in zip(vertices.items(), places, strict=True)
+            ]
+            rows, clusters = facets.arrange(parts, np.isnan(triangles.packs["vertex"][:, 0]).ravel())
             self._upload("block_nodes", bvh.build_top_with_triangles(self.device, bounds, others, None))
+        self.cluster_count = len(clusters)
+        self._upload("facets", _joined([rows], layout.FACET))
+        self._upload("clusters", _joined([clusters], layout.CLUSTER))
+
+    def _triangles_on_top(
+        self, vertices: dict[int, npt.NDArray[np.float32]]
+    ) -> tuple[bvh.Bvh, list[npt.NDArray[np.uint32]]]:
+        """The tree over the triangles of these objects, whose packs tell object and face; and, for each
+        object, the places of its faces, as HIT_TRIANGLE has it."""
+        meshes = [self.scene.objects[i].mesh for i in vertices]
+        firsts = np.cumsum([0, *(len(v) for v in vertices.values())])
+        faces = [mesh.faces + first for mesh, first in zip(meshes, firsts, strict=False)]
+        tree = bvh.build_triangles(
+            self.device, np.concatenate(list(vertices.values())), np.concatenate(faces).astype(np.int32)
+        )
+        counts = [len(f) for f in faces]
+        owner = np.repeat(np.array(list(vertices), np.uint32), counts)
+        own_face = np.concatenate([np.arange(n, dtype=np.uint32) for n in counts])
+        face = tree.packs["face"]
+        used = face != layout.NO_INDEX
+        place = np.empty(len(own_face), np.uint32)
+        place[face[used]] = np.flatnonzero(used) | layout.NODE_PACK
+        tree.packs["object"][used] = owner[face[used]]
+        face[used] = own_face[face[used]]
+        return tree, np.split(place, np.cumsum(counts)[:-1])
+
+    def _facets_of(self, mesh: Mesh) -> facets.Facets:
+        if mesh not in self._facets:
+            self._facets[mesh] = facets.pair_faces(mesh)
+        return self._facets[mesh]
 
     def _build_environment(self) -> None:
         image = self.scene.environment.image
@@ -324,4 +344,5 @@ _PARTS: tuple[tuple[str, Callable[[Change], bool]], ...] = (
 
 def _joined(arrays: Sequence[npt.NDArray[Any]], dtype: np.dtype[Any]) -> npt.NDArray[Any]:
     # A kernel argument needs a buffer even where nobody reads it.
-    return np.concatenate(arrays) if arrays else np.zeros(1, dtype)
+    joined = np.concatenate(arrays) if arrays else np.zeros(0, dtype)
+    return joined if len(joined) else np.zeros(1, dtype)

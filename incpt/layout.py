@@ -222,6 +222,28 @@ TRIANGLE_PACK = _packed(
     ]
 )
 
+FACET = _packed(
+    [
+        # A parallelogram or a triangle in world space: corners A, B, C, D on the way around, x, y and z of
+        # each. A triangle has C in place of D.
+        ("vertex", np.float32, (12,)),
+        # Places of the triangles ABC and ACD in the packs of the top level, as HIT_TRIANGLE has it.
+        ("place", np.uint32, (2,)),
+        ("object", np.uint32),
+        ("turns", np.uint32),  # which corner of these triangles A is, two bits each
+    ]
+)
+
+CLUSTER = _packed(
+    [
+        # Facets that stand together: least and greatest x, y and z; parallelograms, then triangles.
+        ("bounds", np.float32, (6,)),
+        ("first", np.uint32),
+        ("first_triangle", np.uint32),
+        ("end", np.uint32),
+    ]
+)
+
 OBJECT = _packed(
     [
         ("object_from_world", np.float32, (12,)),  # 3 x 4, row by row
@@ -304,6 +326,8 @@ PARAMS = _packed(
 STRUCTS: dict[str, np.dtype[np.void]] = {
     "Node": NODE,
     "TrianglePack": TRIANGLE_PACK,
+    "Facet": FACET,
+    "Cluster": CLUSTER,
     "Object": OBJECT,
     "Material": MATERIAL,
     "Slot": SLOT,
