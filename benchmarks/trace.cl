@@ -19,14 +19,14 @@ STAGE void load_rays(const Block *block, __local float *planes, uint path_class,
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
 trace_closest(const uint count, __global const float *given, __global const float *limits, BLOCK_PARAMETERS,
               __global float *distances) {
-    const Block block = BLOCK(0, 0);
+    Block block = BLOCK(0, 0);
     const uint first = (uint)get_group_id(0) * BLOCK_PATHS, size = MIN(count - first, BLOCK_PATHS);
     load_rays(&block, block.state.rays, CLASS_LIVE, first, size, count, given);
-    uint escaped_count;
-    trace_rays(&block, size, &escaped_count);
+    trace_rays(&block, size);
     for (uint i = 0; i < size; i++) {
         const uint met = load_bits(block.state.hits, HIT_OBJECT * BLOCK_STRIDE + i) != NO_INDEX;
-        distances[first + i] = met ? block.state.hits[HIT_DISTANCE * BLOCK_STRIDE + i] : INFINITY;
+        distances[first + block.results[i]] =
+            met ? block.state.hits[HIT_DISTANCE * BLOCK_STRIDE + i] : INFINITY;
     }
 }
 
@@ -34,7 +34,7 @@ trace_closest(const uint count, __global const float *given, __global const floa
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
 trace_any(const uint count, __global const float *given, __global const float *limits, BLOCK_PARAMETERS,
           __global float *distances) {
-    const Block block = BLOCK(0, 0);
+    Block block = BLOCK(0, 0);
     const uint first = (uint)get_group_id(0) * BLOCK_PATHS, size = MIN(count - first, BLOCK_PATHS);
     const State *state = &block.state;
     load_rays(&block, state->shadows, CLASS_SHADOW, first, size, count, given);

@@ -1,52 +1,24 @@
 #include "bvh.cl"
-#include "state.cl"
+#include "lanes.cl"
 
 // Rays against all triangles of a small top level, for blocks of paths. Where a scene has few triangles, the
 // way through a tree is a chain of waiting for memory and of wrongly guessed branches; going over all of them
 // with sixteen rays in the lanes has neither.
 //
 // The triangle test is that of bvh.cl. Its axes depend on the largest component of the direction, so that
-// rays are sorted by it; then they are the same for all lanes.
+// rays are sorted by it; then they are the same for all lanes. A parallelogram is tested as a triangle is, by
+// the signs of four edges, so that no ray slips through between it and its neighbours.
 
-// LLVM 14 keeps to registers of 256 bits unless it is told that the code needs wider ones.
-#ifdef __AVX512F__
-#define WIDE __attribute__((min_vector_width(512)))
-#else
-#define WIDE
-#endif
-
-#define SWEEP_WIDTH 16
-
-// Without AVX-512 clang warns that float16 is passed otherwise than with it; nothing is passed to other
-// programs.
-#ifdef __clang__
-#pragma clang diagnostic ignored "-Wpsabi"
-#endif
-
-// Planes of rays that are ready for the test, in its axes, and of what it finds.
-#define SWEEP_ORIGIN 0
-#define SWEEP_SHEAR 3
-#define SWEEP_LIMIT 6 // then the distance
-#define SWEEP_WEIGHT 7
-#define SWEEP_PLACE 10 // of the facet
-#define SWEEP_PLANES 11
+// Planes of what the sweep finds.
+#define SWEEP_DISTANCE 0
+#define SWEEP_WEIGHT 1
+#define SWEEP_PLACE 4 // of the facet
 
 typedef struct {
     __global const Facet *facets;
     __global const Cluster *clusters;
     uint cluster_count; // at most 32, of which rays meet the last without asking for its box
-    __local float *planes;
 } Sweep;
-
-INLINE float16 sweep_load(__local const float *place) {
-    typedef float16 Unaligned __attribute__((aligned(4)));
-    return *(__local const Unaligned *)place;
-}
-
-INLINE void sweep_store(__local float *place, float16 value) {
-    typedef float16 Unaligned __attribute__((aligned(4)));
-    *(__local Unaligned *)place = value;
-}
 
 INLINE bool sweep_any(const int16 comparison) {
 #ifdef __AVX512DQ__
@@ -87,9 +59,10 @@ typedef struct {
 #define SWEEP_EDGE(from, to) sweep_edge(to##x, to##y, from##x, from##y)
 
 // Tests the rays against a parallelogram, or a triangle. Of both the weights of the corners A, B and C are
-// kept: in the other half of a parallelogram that of B is negative.
+// kept: in the other half of a parallelogram that of B is negative. With `any`, that something is met is
+// kept.
 INLINE void sweep_facet(SweepGroup *group, __global const Facet *facet, uint index, const uint *axes,
-                        const bool triangle) {
+                        const bool triangle, const bool any) {
     __global const float *vertex = facet->vertex;
 #define SWEEP_CORNER(name, corner)                                                                           \
     const float16 name##z = vertex[3 * corner + axes[2]] - group->origin[2];                                 \
@@ -114,11 +87,13 @@ INLINE void sweep_facet(SweepGroup *group, __global const Facet *facet, uint ind
     // of 0 fails one of them.
     const float16 distance = depth / determinant;
     const int16 met = ((lowest >= 0.0f) | (highest <= 0.0f)) & (distance > 0.0f) & (distance < group->limit);
+    group->place = met ? (uint16)(index) : group->place;
+    if (any)
+        return;
     group->limit = met ? distance : group->limit;
     group->weight[0] = met ? u : group->weight[0];
     group->weight[1] = met ? v : group->weight[1];
     group->weight[2] = met ? w : group->weight[2];
-    group->place = met ? (uint16)(index) : group->place;
 }
 
 // The clusters, a bit for each, whose boxes some ray of the group meets, and the last.
@@ -149,51 +124,52 @@ INLINE uint sweep_clusters(const Sweep *sweep, const SweepGroup *group, const ui
     return met;
 }
 
-// Tests sixteen rays, from place `first` on, against all facets; `axis` is the largest of their directions.
-static __attribute__((noinline)) WIDE void sweep_rays(const Sweep *sweep, uint first, uint axis) {
-    __local float *planes = sweep->planes + first;
+// Tests sixteen rays against all facets; `axis` is the largest of their directions. `rays` are planes of
+// origins, directions and, with `any`, how far the rays look; what is found comes into the planes `found`,
+// with `any` that something is met alone.
+INLINE void sweep_group(const Sweep *sweep, __local const float *rays, uint axis, const bool any,
+                        __local float *found) {
     const uint axes[3] = {bvh_x_axis(axis), bvh_y_axis(axis), axis};
     SweepGroup group;
+    group.shear[2] = 1.0f / load_lanes(rays + (3 + axis) * BLOCK_STRIDE);
 #pragma unroll
     for (uint i = 0; i < 3; i++) {
-        group.origin[i] = sweep_load(planes + (SWEEP_ORIGIN + i) * BLOCK_STRIDE);
-        group.shear[i] = sweep_load(planes + (SWEEP_SHEAR + i) * BLOCK_STRIDE);
+        group.origin[i] = load_lanes(rays + axes[i] * BLOCK_STRIDE);
+        if (i < 2)
+            group.shear[i] = load_lanes(rays + (3 + axes[i]) * BLOCK_STRIDE) * group.shear[2];
         group.weight[i] = 0.0f;
     }
-    group.limit = sweep_load(planes + SWEEP_LIMIT * BLOCK_STRIDE);
+    group.limit = any ? load_lanes(rays + 6 * BLOCK_STRIDE) : INFINITY;
     group.place = NO_INDEX;
     for (uint waiting = sweep_clusters(sweep, &group, axes); waiting; waiting &= waiting - 1) {
         __global const Cluster *cluster = sweep->clusters + BVH_FIRST_BIT(waiting);
         uint i = cluster->first;
         for (; i < cluster->first_triangle; i++)
-            sweep_facet(&group, sweep->facets + i, i, axes, false);
+            sweep_facet(&group, sweep->facets + i, i, axes, false, any);
         for (; i < cluster->end; i++)
-            sweep_facet(&group, sweep->facets + i, i, axes, true);
+            sweep_facet(&group, sweep->facets + i, i, axes, true, any);
     }
-    sweep_store(planes + SWEEP_LIMIT * BLOCK_STRIDE, group.limit);
+    store_lanes(found + SWEEP_PLACE * BLOCK_STRIDE, as_float16(group.place));
+    if (any)
+        return;
+    store_lanes(found + SWEEP_DISTANCE * BLOCK_STRIDE, group.limit);
 #pragma unroll
     for (uint i = 0; i < 3; i++)
-        sweep_store(planes + (SWEEP_WEIGHT + i) * BLOCK_STRIDE, group.weight[i]);
-    sweep_store(planes + SWEEP_PLACE * BLOCK_STRIDE, as_float16(group.place));
+        store_lanes(found + (SWEEP_WEIGHT + i) * BLOCK_STRIDE, group.weight[i]);
 }
 
-// Makes the ray in planes `ray` of a path ready: origin and direction, BLOCK_STRIDE apart, x first.
-INLINE void sweep_prepare(const Sweep *sweep, uint place, __local const float *ray, uint path, uint axis,
-                          float limit) {
-    __local float *planes = sweep->planes + place;
-    const uint x = bvh_x_axis(axis), y = bvh_y_axis(axis);
-    __local const float *direction = ray + 3 * BLOCK_STRIDE;
-    const float inverse = 1.0f / direction[axis * BLOCK_STRIDE + path];
-    planes[(SWEEP_ORIGIN + 0) * BLOCK_STRIDE] = ray[x * BLOCK_STRIDE + path];
-    planes[(SWEEP_ORIGIN + 1) * BLOCK_STRIDE] = ray[y * BLOCK_STRIDE + path];
-    planes[(SWEEP_ORIGIN + 2) * BLOCK_STRIDE] = ray[axis * BLOCK_STRIDE + path];
-    planes[(SWEEP_SHEAR + 0) * BLOCK_STRIDE] = direction[x * BLOCK_STRIDE + path] * inverse;
-    planes[(SWEEP_SHEAR + 1) * BLOCK_STRIDE] = direction[y * BLOCK_STRIDE + path] * inverse;
-    planes[(SWEEP_SHEAR + 2) * BLOCK_STRIDE] = inverse;
-    planes[SWEEP_LIMIT * BLOCK_STRIDE] = limit;
+// Up to fifteen more rays than `count` are read, and their places in `found` written: in the planes of a
+// block there is room for them.
+static __attribute__((noinline)) WIDE void sweep_rays(const Sweep *sweep, __local const float *rays,
+                                                      uint axis, uint count, __local float *found) {
+    for (uint first = 0; first < count; first += LANE_COUNT)
+        sweep_group(sweep, rays + first, axis, false, found + first);
 }
 
-// The largest component of a path's ray.
-INLINE uint sweep_axis(__local const float *ray, uint path) {
-    return bvh_main_axis(load3(ray + 3 * BLOCK_STRIDE, BLOCK_STRIDE, path));
+#ifdef LIGHT_SAMPLING
+static __attribute__((noinline)) WIDE void sweep_any_rays(const Sweep *sweep, __local const float *rays,
+                                                          uint axis, uint count, __local float *found) {
+    for (uint first = 0; first < count; first += LANE_COUNT)
+        sweep_group(sweep, rays + first, axis, true, found + first);
 }
+#endif

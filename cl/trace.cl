@@ -31,11 +31,12 @@ TRACE_CALL bool trace_path(const Geometry *geometry, const State *state, uint pa
     return true;
 }
 
-// Which shading kernel a path that has hit something waits for.
+// Which shading kernel a path waits for, if it has hit something.
 INLINE uint surface_class(const Geometry *geometry, __global const Material *materials, const State *state,
                           uint path) {
     uint in_medium = load_bits(state->paths, PATH_MEDIUM_0 * STRIDE(state) + path) != NO_INDEX;
     uint object = load_bits(state->hits, HIT_OBJECT * STRIDE(state) + path);
+    object = object == NO_INDEX ? 0u : object;
     uint transmissive = materials[geometry->objects[object].material].flags & MATERIAL_TRANSMISSIVE;
     return in_medium | transmissive ? CLASS_MEDIUM : CLASS_SURFACE;
 }

@@ -13,17 +13,10 @@
 #include "generate.cl"
 #include "illuminate.cl"
 #include "medium_shade.cl"
+#include "pick.cl"
 #include "shade.cl"
 #include "sweep.cl"
 #include "trace.cl"
-
-// The iterations are independent of each other, in whatever order. LLVM knows it from a note on the function
-// call in the loop, which is lost where an argument is a constant or not used.
-#ifdef __clang__
-#define LANES _Pragma("clang loop vectorize(assume_safety) vectorize_width(16) interleave(disable)")
-#else
-#define LANES
-#endif
 
 // Functions of their own: the compiler is quicker with several small ones, and a profiler tells them apart.
 #define STAGE static __attribute__((noinline)) WIDE
@@ -32,7 +25,19 @@
 #define ALL_SWEPT
 #endif
 
+// Which planes of a path outlive its ray.
+#ifdef MEDIA
+#define LAST_CARRIED PATH_MEDIUM_1
+#else
+#define LAST_CARRIED PATH_RESULT
+#endif
+
 // A work-item's block, and the scene.
+//
+// Before each ray those paths that are still alive come to stand in front, sorted by the largest component of
+// their direction where rays are swept; behind it those that have hit something do. Rays and paths lie in
+// one of two places: where shadow rays and the description of hits are kept else, while rays are traced, and
+// in planes of their own.
 typedef struct {
     const Params *params;
     __global const Slot *slots;
@@ -41,12 +46,23 @@ typedef struct {
     __global const float *layers;
     Sweep sweep;
     State state;
+    __local float *own_rays; // where rays and paths lie, but while rays are traced
+    __local float *own_paths;
     __local uint *results; // the plane PATH_RESULT: where a path gathers
-    __local uint *list;    // places of paths, as are the next two
-    __local uint *escaped;
-    __local uint *by_axis; // three rows
-    __local float *spare;  // planes that stages use for themselves; those of `sweep`
+    __local uint *list;    // places of paths
+    __local uint *words;   // of what is picked, as are the next three
+    __local uint *rows;
+    __local float *spare; // planes that stages use for themselves
 } Block;
+
+// There is room for rays and paths beside what is known of hits while rays are traced.
+typedef char assert_room[SHADOW_PLANES + HIT_DISTANCE >= RAY_PLANES + LAST_CARRIED + 1 ? 1 : -1];
+
+INLINE void place_paths(Block *block, __local float *rays, __local float *paths) {
+    block->state.rays = rays;
+    block->state.paths = paths;
+    block->results = (__local uint *)paths + PATH_RESULT * BLOCK_STRIDE;
+}
 
 // Starts the paths from place `first` of the path buffer on.
 STAGE void start_paths(const Block *block, uint first, uint count) {
@@ -58,46 +74,63 @@ STAGE void start_paths(const Block *block, uint first, uint count) {
     }
 }
 
-// Puts the places of the paths of a class into `list`; returns how many they are.
-STAGE uint list_paths(const Block *block, uint count, uint wanted, __local uint *list) {
-    uint listed = 0;
-    for (uint i = 0; i < count; i++) {
-        list[listed] = i;
-        listed += (load_bits(block->state.paths, PATH_CLASS * BLOCK_STRIDE + i) & wanted) != 0u;
+#ifdef FEW_ON_TOP
+#define LIVE_KINDS 3 // by the largest component of the direction
+#else
+#define LIVE_KINDS 1
+#endif
+
+// Which of `count` paths have a bit in their class, by the kinds of their rays; in the lanes.
+STAGE void pick_rays(const Block *block, __local const float *rays, uint wanted, uint count, Picked *kinds) {
+    __local uint *keys = (__local uint *)block->spare;
+    LANES
+    for (int i = 0; i < (int)count; i++) {
+        uint meant = (load_bits(block->state.paths, PATH_CLASS * BLOCK_STRIDE + i) & wanted) != 0u;
+#ifdef FEW_ON_TOP
+        uint kind = bvh_main_axis(load3(rays + 3 * BLOCK_STRIDE, BLOCK_STRIDE, i));
+#else
+        uint kind = 0u;
+#endif
+        keys[i] = meant ? kind : NO_INDEX;
     }
-    return listed;
+    for (uint kind = 0; kind < LIVE_KINDS; kind++)
+        kinds[kind] = pick(keys, kind, count, block->rows + kind * BLOCK_STRIDE);
+}
+
+// Moves the live ones of `count` paths to where they are traced, kind after kind; returns how many they are.
+STAGE uint gather_live(Block *block, uint count, Picked *kinds) {
+    State *state = &block->state;
+    pick_rays(block, state->rays, CLASS_LIVE, count, kinds);
+    for (uint kind = 0; kind < LIVE_KINDS; kind++)
+        if (kinds[kind].count == count)
+            return count; // they are there already
+    __local float *rays = state->shadows, *paths = rays + RAY_PLANES * BLOCK_STRIDE;
+    uint live = 0;
+    for (uint kind = 0; kind < LIVE_KINDS; kind++) {
+        for (uint p = 0; p < RAY_PLANES; p++)
+            move_plane(rays + p * BLOCK_STRIDE + live, state->rays + p * BLOCK_STRIDE, &kinds[kind]);
+        for (uint p = 0; p <= LAST_CARRIED; p++)
+            move_plane(paths + p * BLOCK_STRIDE + live, state->paths + p * BLOCK_STRIDE, &kinds[kind]);
+        live += kinds[kind].count;
+    }
+    place_paths(block, rays, paths);
+    return live;
 }
 
 #ifdef FEW_ON_TOP
-// Sorts the paths whose class has a bit by the largest component of their ray; `by_axis` has a row for each.
-STAGE void sort_by_axis(const Block *block, __local const float *rays, uint wanted, uint count,
-                        uint *counts) {
-    __local uint *axes = (__local uint *)block->spare;
-    counts[0] = counts[1] = counts[2] = 0;
-    LANES
-    for (int i = 0; i < (int)count; i++)
-        axes[i] = sweep_axis(rays, i);
-    for (uint i = 0; i < count; i++) {
-        uint axis = axes[i];
-        block->by_axis[axis * BLOCK_STRIDE + counts[axis]] = i;
-        counts[axis] += (load_bits(block->state.paths, PATH_CLASS * BLOCK_STRIDE + i) & wanted) != 0u;
-    }
-}
-
 // Of a parallelogram ABCD the sweep leaves the weights of A, B and C, where that of B is against the others
 // in the half ACD: as B is A + C - D, those of A, C and D follow.
-INLINE void keep_swept(const Sweep *sweep, const State *state, uint place, uint path) {
-    __local const float *planes = sweep->planes + place;
-    uint index = as_uint(planes[SWEEP_PLACE * BLOCK_STRIDE]);
+INLINE void keep_swept(const Sweep *sweep, const State *state, __local const float *found, uint path) {
+    uint index = load_bits(found, SWEEP_PLACE * BLOCK_STRIDE + path);
     int met = index != NO_INDEX;
     __global const Facet *facet = sweep->facets + (met ? index : 0u);
-    Vec3 weight = load3(planes + SWEEP_WEIGHT * BLOCK_STRIDE, BLOCK_STRIDE, 0);
+    Vec3 weight = load3(found + SWEEP_WEIGHT * BLOCK_STRIDE, BLOCK_STRIDE, path);
     float others = weight.x + weight.z;
     int second = ((weight.y < 0.0f) & (others > 0.0f)) | ((weight.y > 0.0f) & (others < 0.0f));
     weight = choose(second, vec3(weight.x + weight.y, weight.z + weight.y, -weight.y), weight);
     uint triangle = second ? facet->place[1] : facet->place[0];
     uint corner = second ? facet->turns >> 2 : facet->turns & 3u;
-    state->hits[HIT_DISTANCE * BLOCK_STRIDE + path] = planes[SWEEP_LIMIT * BLOCK_STRIDE];
+    state->hits[HIT_DISTANCE * BLOCK_STRIDE + path] = found[SWEEP_DISTANCE * BLOCK_STRIDE + path];
     store_bits(state->hits, HIT_OBJECT * BLOCK_STRIDE + path, met ? facet->object : NO_INDEX);
     store_bits(state->hits, HIT_TRIANGLE * BLOCK_STRIDE + path, met ? triangle : NO_INDEX);
     Vec3 turned = choose(corner == 1u, vec3(weight.z, weight.x, weight.y), weight);
@@ -105,22 +138,16 @@ INLINE void keep_swept(const Sweep *sweep, const State *state, uint place, uint 
     store3(state->hits + HIT_POSITION_X * BLOCK_STRIDE, BLOCK_STRIDE, path, turned);
 }
 
-// What the rays of the live paths meet of the top level.
-STAGE void sweep_nearest(const Block *block, uint count) {
-    uint counts[3];
-    sort_by_axis(block, block->state.rays, CLASS_LIVE, count, counts);
+// What the rays of `count` paths meet of the top level.
+STAGE void sweep_nearest(const Block *block, uint count, const Picked *kinds) {
+    uint first = 0;
     for (uint axis = 0; axis < 3; axis++) {
-        __local const uint *sorted = block->by_axis + axis * BLOCK_STRIDE;
-        float limit = INFINITY;
-        LANES
-        for (int i = 0; i < (int)counts[axis]; i++)
-            sweep_prepare(&block->sweep, i, block->state.rays, sorted[i], axis, limit);
-        for (uint first = 0; first < counts[axis]; first += SWEEP_WIDTH)
-            sweep_rays(&block->sweep, first, axis);
-        LANES
-        for (int i = 0; i < (int)counts[axis]; i++)
-            keep_swept(&block->sweep, &block->state, i, sorted[i]);
+        sweep_rays(&block->sweep, block->state.rays + first, axis, kinds[axis].count, block->spare + first);
+        first += kinds[axis].count;
     }
+    LANES
+    for (int i = 0; i < (int)count; i++)
+        keep_swept(&block->sweep, &block->state, block->spare, i);
 }
 #endif
 
@@ -133,69 +160,129 @@ STAGE void prepare_flights(const Block *block, __local const float *rays, uint c
 }
 #endif
 
-// Traces the rays of the live ones of `count` paths; returns how many hit something. Their places come to
-// stand in `list`, the places of those that left the scene in `escaped`.
-STAGE uint trace_rays(const Block *block, uint count, uint *escaped_count) {
-    const State *state = &block->state;
+// Traces the rays of the live ones of `count` paths; returns how many they are. They come to stand in front.
+STAGE uint trace_rays(Block *block, uint count) {
+    Picked kinds[LIVE_KINDS];
+    const uint live = gather_live(block, count, kinds);
 #ifdef FEW_ON_TOP
-    sweep_nearest(block, count);
+    sweep_nearest(block, live, kinds);
 #endif
 #ifndef ALL_SWEPT
-    prepare_flights(block, state->rays, count);
-    fly_to_nearest(&block->geometry, state, block->spare, block->list,
-                   list_paths(block, count, CLASS_LIVE, block->list));
+    prepare_flights(block, block->state.rays, live);
+    for (uint i = 0; i < live; i++)
+        block->list[i] = i;
+    fly_to_nearest(&block->geometry, &block->state, block->spare, block->list, live);
 #endif
-    uint hit_count = 0, missed = 0;
-    for (uint i = 0; i < count; i++) {
-        uint live = load_bits(state->paths, PATH_CLASS * BLOCK_STRIDE + i) & CLASS_LIVE;
-        uint hit = load_bits(state->hits, HIT_OBJECT * BLOCK_STRIDE + i) != NO_INDEX;
-        block->list[hit_count] = i;
-        block->escaped[missed] = i;
-        hit_count += live & hit;
-        missed += live & !hit;
-    }
-    *escaped_count = missed;
-    return hit_count;
+    return live;
 }
 
-STAGE void escape_paths(const Block *block, uint count) {
+// What rays have led paths to.
+typedef struct {
+    Picked escaped, surfaces, media;
+} Ends;
+
+#define KEY_ESCAPED 0
+#define KEY_SURFACE 1
+#define KEY_MEDIUM 2
+
+STAGE void tell_apart(const Block *block, uint count, Ends *ends) {
+    __local uint *keys = (__local uint *)block->spare;
     LANES
-    for (int i = 0; i < (int)count; i++)
-        escape_path(block->params, &block->emitters, &block->state, block->escaped[i],
-                    block->results[block->escaped[i]]);
+    for (int i = 0; i < (int)count; i++) {
+        uint hit = load_bits(block->state.hits, HIT_OBJECT * BLOCK_STRIDE + i) != NO_INDEX;
+#ifdef MEDIA
+        uint medium =
+            surface_class(&block->geometry, block->emitters.materials, &block->state, i) == CLASS_MEDIUM;
+        keys[i] = hit ? (medium ? KEY_MEDIUM : KEY_SURFACE) : KEY_ESCAPED;
+#else
+        keys[i] = hit ? KEY_SURFACE : KEY_ESCAPED;
+#endif
+    }
+    ends->escaped = pick(keys, KEY_ESCAPED, count, block->rows);
+    ends->surfaces = pick(keys, KEY_SURFACE, count, block->rows + BLOCK_STRIDE);
+#ifdef MEDIA
+    ends->media = pick(keys, KEY_MEDIUM, count, block->rows + 2 * BLOCK_STRIDE);
+#endif
+}
+
+STAGE void escape_paths(const Block *block, const Picked *escaped) {
+    list_picked(block->list, escaped, 0);
+    LANES
+    for (int i = 0; i < (int)escaped->count; i++)
+        escape_path(block->params, &block->emitters, &block->state, block->list[i],
+                    block->results[block->list[i]]);
+}
+
+// Moves a plane of all paths that have hit something, those on opaque surfaces in front.
+INLINE void move_hits(__local float *to, __local const float *from, const Ends *ends, __local float *spare) {
+#ifdef MEDIA
+    move_plane(spare, from, &ends->media);
+#endif
+    move_plane(to, from, &ends->surfaces);
+#ifdef MEDIA
+    for (uint first = 0; first < ends->media.count; first += LANE_COUNT)
+        store_lanes(to + ends->surfaces.count + first, load_lanes(spare + first));
+#endif
+}
+
+// Moves those paths to their own planes; returns how many they are.
+STAGE uint gather_hits(Block *block, const Ends *ends) {
+    const State *state = &block->state;
+    __local float *rays = block->own_rays, *paths = block->own_paths, *spare = block->spare;
+    for (uint p = RAY_DIRECTION_X; p <= RAY_DIRECTION_Z; p++)
+        move_hits(rays + p * BLOCK_STRIDE, state->rays + p * BLOCK_STRIDE, ends, spare);
+    for (uint p = 0; p <= LAST_CARRIED; p++)
+        move_hits(paths + p * BLOCK_STRIDE, state->paths + p * BLOCK_STRIDE, ends, spare);
+    for (uint p = HIT_DISTANCE; p <= HIT_TRIANGLE; p++)
+        if (p != HIT_MATERIAL)
+            move_hits(state->hits + p * BLOCK_STRIDE, state->hits + p * BLOCK_STRIDE, ends, spare);
+    place_paths(block, rays, paths);
+#ifdef MEDIA
+    return ends->surfaces.count + ends->media.count;
+#else
+    return ends->surfaces.count;
+#endif
 }
 
 #ifdef LIGHT_SAMPLING
 #ifdef FEW_ON_TOP
-INLINE void occlude_swept(const Sweep *sweep, const State *state, uint place, uint path, uint result) {
-    int free = as_uint(sweep->planes[SWEEP_PLACE * BLOCK_STRIDE + place]) == NO_INDEX;
-    Vec3 light = load3(state->shadows + SHADOW_RADIANCE_R * BLOCK_STRIDE, BLOCK_STRIDE, path);
-    gather(state, result, choose(free, light, vec3(0.0f, 0.0f, 0.0f)));
+// Planes of shadow rays that are swept: those of ShadowPlane up to the radiance that they bring, and where
+// that is gathered.
+#define SWEPT_RESULT SHADOW_PDF
+#define SWEPT_FOUND (SWEPT_RESULT + 1 - SWEEP_PLACE)
+
+INLINE void occlude_swept(const State *state, __local const float *rays, __local const float *found, uint i) {
+    int free = load_bits(found, SWEEP_PLACE * BLOCK_STRIDE + i) == NO_INDEX;
+    Vec3 light = load3(rays + SHADOW_RADIANCE_R * BLOCK_STRIDE, BLOCK_STRIDE, i);
+    gather(state, load_bits(rays, SWEPT_RESULT * BLOCK_STRIDE + i),
+           choose(free, light, vec3(0.0f, 0.0f, 0.0f)));
 }
 
 // Which shadow rays nothing in the top level is in the way of; returns how many. Their paths come to stand in
 // `list`, or, where there is nothing but the top level, gather what they bring.
 STAGE uint sweep_shadows(const Block *block, uint count) {
-    uint counts[3], free = 0;
-    __local const float *shadows = block->state.shadows;
-    sort_by_axis(block, shadows, CLASS_SHADOW, count, counts);
+    Picked kinds[3];
+    const State *state = &block->state;
+    __local float *rays = block->spare, *found = rays + SWEPT_FOUND * BLOCK_STRIDE;
+    uint free = 0;
+    pick_rays(block, state->shadows, CLASS_SHADOW, count, kinds);
     for (uint axis = 0; axis < 3; axis++) {
-        __local const uint *sorted = block->by_axis + axis * BLOCK_STRIDE;
-        LANES
-        for (int i = 0; i < (int)counts[axis]; i++)
-            sweep_prepare(&block->sweep, i, shadows, sorted[i], axis,
-                          shadows[SHADOW_DISTANCE * BLOCK_STRIDE + sorted[i]]);
-        for (uint first = 0; first < counts[axis]; first += SWEEP_WIDTH)
-            sweep_rays(&block->sweep, first, axis);
+        const Picked *picked = &kinds[axis];
+        for (uint p = 0; p < SHADOW_PDF; p++)
+            move_plane(rays + p * BLOCK_STRIDE, state->shadows + p * BLOCK_STRIDE, picked);
+        sweep_any_rays(&block->sweep, rays, axis, picked->count, found);
 #ifdef ALL_SWEPT
+        move_plane(rays + SWEPT_RESULT * BLOCK_STRIDE, (__local const float *)block->results, picked);
         LANES
-        for (int i = 0; i < (int)counts[axis]; i++)
-            occlude_swept(&block->sweep, &block->state, i, sorted[i], block->results[sorted[i]]);
+        for (int i = 0; i < (int)picked->count; i++)
+            occlude_swept(state, rays, found, i);
 #else
-        for (uint i = 0; i < counts[axis]; i++) {
-            block->list[free] = sorted[i];
-            free += as_uint(block->sweep.planes[SWEEP_PLACE * BLOCK_STRIDE + i]) == NO_INDEX;
-        }
+        __local uint *paths = (__local uint *)rays; // which are done with
+        list_picked(paths, picked, 0);
+        const Picked unmet = pick((__local const uint *)found + SWEEP_PLACE * BLOCK_STRIDE, NO_INDEX,
+                                  picked->count, block->words);
+        move_plane((__local float *)block->list + free, (__local const float *)paths, &unmet);
+        free += unmet.count;
 #endif
     }
     return free;
@@ -207,74 +294,15 @@ STAGE void trace_shadows(const Block *block, uint count) {
 #ifdef FEW_ON_TOP
     uint listed = sweep_shadows(block, count);
 #else
-    uint listed = list_paths(block, count, CLASS_SHADOW, block->list);
+    Picked picked;
+    pick_rays(block, block->state.shadows, CLASS_SHADOW, count, &picked);
+    list_picked(block->list, &picked, 0);
+    uint listed = picked.count;
 #endif
 #ifndef ALL_SWEPT
     prepare_flights(block, block->state.shadows, count);
     fly_to_lights(&block->geometry, &block->state, block->spare, block->list, listed);
 #endif
-}
-#endif
-
-// What the places of paths that hit something are told apart by: opaque surfaces come to stand in front.
-typedef struct {
-    __local uint *surfaces;
-    uint surface_count;
-    __local uint *media;
-    uint media_count;
-    __local float *spare; // a plane
-} Places;
-
-// Moves a plane of all these paths to the front. Places grow, so that what is read is not overwritten yet.
-INLINE void move_plane(__local float *plane, const Places *places) {
-#ifdef MEDIA
-    LANES
-    for (int i = 0; i < (int)places->media_count; i++)
-        places->spare[i] = plane[places->media[i]];
-#endif
-    LANES
-    for (int i = 0; i < (int)places->surface_count; i++)
-        plane[i] = plane[places->surfaces[i]];
-#ifdef MEDIA
-    LANES
-    for (int i = 0; i < (int)places->media_count; i++)
-        plane[places->surface_count + i] = places->spare[i];
-#endif
-}
-
-STAGE void move_paths(const State *state, const Places *places) {
-    for (uint p = RAY_DIRECTION_X; p <= RAY_DIRECTION_Z; p++)
-        move_plane(state->rays + p * BLOCK_STRIDE, places);
-    for (uint p = 0; p <= PATH_COUNTS; p++)
-        move_plane(state->paths + p * BLOCK_STRIDE, places);
-    move_plane(state->paths + PATH_RESULT * BLOCK_STRIDE, places);
-    for (uint p = HIT_DISTANCE; p <= HIT_POSITION_Z; p++)
-        move_plane(state->hits + p * BLOCK_STRIDE, places);
-    move_plane(state->hits + HIT_OBJECT * BLOCK_STRIDE, places);
-    move_plane(state->hits + HIT_TRIANGLE * BLOCK_STRIDE, places);
-#ifdef MEDIA
-    move_plane(state->paths + PATH_MEDIUM_0 * BLOCK_STRIDE, places);
-    move_plane(state->paths + PATH_MEDIUM_1 * BLOCK_STRIDE, places);
-#endif
-}
-
-#ifdef MEDIA
-// Splits the `count` paths of places->surfaces into those on opaque surfaces and those at or in media.
-STAGE void tell_apart(const Block *block, uint count, Places *places) {
-    __local uint *classes = (__local uint *)places->spare;
-    LANES
-    for (int i = 0; i < (int)count; i++)
-        classes[i] =
-            surface_class(&block->geometry, block->emitters.materials, &block->state, places->surfaces[i]);
-    places->surface_count = places->media_count = 0;
-    for (uint i = 0; i < count; i++) {
-        uint path = places->surfaces[i];
-        uint opaque = classes[i] == CLASS_SURFACE;
-        places->surfaces[places->surface_count] = path;
-        places->media[places->media_count] = path;
-        places->surface_count += opaque;
-        places->media_count += !opaque;
-    }
 }
 #endif
 
@@ -297,12 +325,11 @@ STAGE void shade_media(const Block *block, uint first, uint count) {
     LANES
     for (int i = first; i < (int)count; i++)
         shade_medium_path(block->params, block->emitters.materials, state, i, block->results[i]);
+    __local const uint *classes = (__local const uint *)state->paths + PATH_CLASS * BLOCK_STRIDE;
+    const Picked picked = pick(classes + first, CLASS_SURFACE, count - first, block->words);
     __local uint *list = block->list;
-    uint opaque = 0;
-    for (uint i = first; i < count; i++) {
-        list[opaque] = i;
-        opaque += load_bits(state->paths, PATH_CLASS * BLOCK_STRIDE + i) == CLASS_SURFACE;
-    }
+    list_picked(list, &picked, first);
+    const uint opaque = picked.count;
 #ifdef LIGHT_SAMPLING
     LANES
     for (int i = 0; i < (int)opaque; i++)
@@ -337,23 +364,19 @@ STAGE void shade_surfaces(const Block *block, uint count) {
 }
 
 // Takes the paths of a block, from place `first` of the path buffer on, from their start to their end.
-INLINE void trace_block(const Block *block, uint first, uint count) {
+INLINE void trace_block(Block *block, uint first, uint count) {
     start_paths(block, first, count);
     for (uint ray = 0; count > 0; ray++) {
-        uint escaped_count;
-        count = trace_rays(block, count, &escaped_count);
+        count = trace_rays(block, count);
+        Ends ends;
+        tell_apart(block, count, &ends);
         const float *sky = block->params->environment_color;
         if (sky[0] + sky[1] + sky[2] > 0.0f)
-            escape_paths(block, escaped_count);
-
-        Places places = {block->list, count, block->escaped, 0, block->spare};
-#ifdef MEDIA
-        tell_apart(block, count, &places);
-#endif
-        move_paths(&block->state, &places);
+            escape_paths(block, &ends.escaped);
+        count = gather_hits(block, &ends);
         describe_hits(block, count);
 #ifdef MEDIA
-        shade_media(block, places.surface_count, count);
+        shade_media(block, ends.surfaces.count, count);
 #else
         // Every ray is a scattering event, so that all paths end with the same one.
         if (ray > block->params->max_bounces) {
@@ -361,7 +384,7 @@ INLINE void trace_block(const Block *block, uint first, uint count) {
             return;
         }
 #endif
-        shade_surfaces(block, places.surface_count);
+        shade_surfaces(block, ends.surfaces.count);
 #ifdef LIGHT_SAMPLING
         trace_shadows(block, count);
 #endif
@@ -377,8 +400,8 @@ INLINE void trace_block(const Block *block, uint first, uint count) {
         __global const float *lights, __global const float *environment_image,                               \
         __global const float *environment_marginal, __global const float *environment_conditional,           \
         __global const float *environment_pdf, __local float *rays, __local float *paths,                    \
-        __local float *hits, __local float *shadows, __local float *radiance, __local uint *list,            \
-        __local uint *escaped, __local uint *by_axis, __local float *spare, __global const Facet *facets,    \
+        __local float *shadows_and_hits, __local float *radiance, __local uint *list, __local uint *words,   \
+        __local uint *rows, __local float *spare, __global const Facet *facets,                              \
         __global const Cluster *clusters, const uint cluster_count
 
 #define BLOCK(params, slots)                                                                                 \
@@ -387,17 +410,19 @@ INLINE void trace_block(const Block *block, uint first, uint count) {
      {top_nodes, top_packs, nodes, packs, objects, normals},                                                 \
      {materials, lights, environment_image, environment_marginal, environment_conditional, environment_pdf}, \
      layers,                                                                                                 \
-     {facets, clusters, cluster_count, spare},                                                               \
-     {rays, paths, hits, shadows, radiance},                                                                 \
+     {facets, clusters, cluster_count},                                                                      \
+     {rays, paths, shadows_and_hits + SHADOW_PLANES * BLOCK_STRIDE, shadows_and_hits, radiance},             \
+     rays,                                                                                                   \
+     paths,                                                                                                  \
      (__local uint *)paths + PATH_RESULT * BLOCK_STRIDE,                                                     \
      list,                                                                                                   \
-     escaped,                                                                                                \
-     by_axis,                                                                                                \
+     words,                                                                                                  \
+     rows,                                                                                                   \
      spare}
 
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
 trace_blocks(const Params params, __global const Slot *slots, BLOCK_PARAMETERS, __global float *path_buffer) {
-    const Block block = BLOCK(&params, slots);
+    Block block = BLOCK(&params, slots);
     const uint first = (uint)get_group_id(0) * BLOCK_PATHS;
     const uint size = first < params.path_count ? MIN(params.path_count - first, BLOCK_PATHS) : 0;
     trace_block(&block, first, size);

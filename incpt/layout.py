@@ -78,20 +78,21 @@ class HitPlane(IntEnum):
 
     The geometric normal follows the winding of the face; the shading normal lies on its side.
     OFFSET bounds the rounding error of POSITION: a ray that leaves the surface starts that far
-    along the geometric normal. OBJECT is NO_INDEX (as uint) where the ray left the scene.
+    along the geometric normal. OBJECT is NO_INDEX (as uint) where the ray left the scene. In blocks
+    (trace_blocks.cl) the planes before DISTANCE serve otherwise while rays are traced.
     """
 
-    DISTANCE = 0
-    POSITION_X = 1
-    POSITION_Y = 2
-    POSITION_Z = 3
-    GEOMETRIC_X = 4
-    GEOMETRIC_Y = 5
-    GEOMETRIC_Z = 6
-    SHADING_X = 7
-    SHADING_Y = 8
-    SHADING_Z = 9
-    OFFSET = 10
+    GEOMETRIC_X = 0
+    GEOMETRIC_Y = 1
+    GEOMETRIC_Z = 2
+    SHADING_X = 3
+    SHADING_Y = 4
+    SHADING_Z = 5
+    OFFSET = 6
+    DISTANCE = 7
+    POSITION_X = 8
+    POSITION_Y = 9
+    POSITION_Z = 10
     OBJECT = 11
     MATERIAL = 12
     TRIANGLE = 13
@@ -114,9 +115,9 @@ class PathPlane(IntEnum):
     PIXEL = 4
     SAMPLE = 5
     COUNTS = 6
-    MEDIUM_0 = 7
-    MEDIUM_1 = 8
-    RESULT = 9
+    RESULT = 7
+    MEDIUM_0 = 8
+    MEDIUM_1 = 9
     CLASS = 10
 
 

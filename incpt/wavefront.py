@@ -28,7 +28,9 @@ _MOST_RAYS = 256
 _SPARE_PLANES = 13
 """Planes of a block that its stages use for themselves; see cl/sweep.cl and cl/flights.cl."""
 _BLOCK_PLANES = (
-    *map(len, (layout.RayPlane, layout.PathPlane, layout.HitPlane, layout.ShadowPlane)),
+    len(layout.RayPlane),
+    len(layout.PathPlane),
+    len(layout.ShadowPlane) + len(layout.HitPlane),  # together: see cl/trace_blocks.cl
     3,  # radiance
     1, 1, 3,  # lists of places
     _SPARE_PLANES,

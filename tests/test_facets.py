@@ -190,20 +190,23 @@ def test_faces_without_area_are_left_out(device: Device) -> None:
 _KERNEL = """
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
 hits_of_rays(const uint count, __global const float *given, BLOCK_PARAMETERS, __global float *planes) {
-    const Block block = BLOCK(0, 0);
+    Block block = BLOCK(0, 0);
     const uint first = (uint)get_group_id(0) * BLOCK_PATHS, size = MIN(count - first, BLOCK_PATHS);
     for (uint i = 0; i < size; i++) {
         for (uint p = 0; p < RAY_PLANES; p++)
             block.state.rays[p * BLOCK_STRIDE + i] = given[p * count + first + i];
         store_bits(block.state.paths, PATH_CLASS * BLOCK_STRIDE + i, CLASS_LIVE);
+        block.results[i] = i;
     }
-    uint escaped_count;
-    const uint hit_count = trace_rays(&block, size, &escaped_count);
-    for (uint k = 0; k < hit_count; k++)
-        describe_path(&block.geometry, &block.state, block.list[k]);
+    for (uint i = 0; i < size; i++)
+        ((__global uint *)planes)[HIT_OBJECT * count + first + i] = NO_INDEX;
+    Ends ends;
+    tell_apart(&block, trace_rays(&block, size), &ends);
+    const uint hit_count = gather_hits(&block, &ends);
+    describe_hits(&block, hit_count);
     for (uint p = 0; p < HIT_PLANES; p++)
-        for (uint i = 0; i < size; i++)
-            planes[p * count + first + i] = block.state.hits[p * BLOCK_STRIDE + i];
+        for (uint i = 0; i < hit_count; i++)
+            planes[p * count + first + block.results[i]] = block.state.hits[p * BLOCK_STRIDE + i];
 }
 """
 
