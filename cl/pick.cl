@@ -46,9 +46,11 @@ INLINE void move_plane(__local float *to, __local const float *from, const Picke
     }
 #else
     // Places grow, so that what is read is not overwritten yet.
+    __local const uint *words = picked->words;
+    const int count = (int)picked->count;
     LANES
-    for (int i = 0; i < (int)picked->count; i++)
-        to[i] = from[picked->words[i]];
+    for (int i = 0; i < count; i++)
+        to[i] = from[words[i]];
 #endif
 }
 
@@ -64,8 +66,10 @@ INLINE void list_picked(__local uint *list, const Picked *picked, uint base) {
         place += (int)LANE_COUNT;
     }
 #else
+    __local const uint *words = picked->words;
+    const int count = (int)picked->count;
     LANES
-    for (int i = 0; i < (int)picked->count; i++)
-        list[i] = picked->words[i] + base;
+    for (int i = 0; i < count; i++)
+        list[i] = words[i] + base;
 #endif
 }

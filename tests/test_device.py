@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +15,7 @@ from small_scenes import mixed_scene
 
 from incpt import device as device_module
 from incpt import layout, pocl
-from incpt.benchmarks.scenes import cornell, glass
+from incpt.benchmarks.scenes import cornell, glass, plates
 from incpt.device import DEVICE_VARIABLE, Device, all_devices, choose, device_name, source
 from incpt.device_scene import DeviceScene
 from incpt.errors import DeviceError, InputError
@@ -168,13 +170,19 @@ def test_two_devices_in_a_process_build_the_same_source(device: Device) -> None:
     assert Device(0).program_text("shade") == device.program_text("shade")
 
 
-def test_blocks_and_wavefront_agree(device: Device) -> None:
+def small(make: Callable[[], Scene]) -> Scene:
+    scene = make()
+    return replace(scene, settings=replace(scene.settings, size=(53, 37), base_nor=8, roulette_depth=1))
+
+
+@pytest.mark.parametrize("make", [mixed_scene, cornell, glass, plates], ids=lambda make: make.__name__)
+def test_blocks_and_wavefront_agree(make: Callable[[], Scene], device: Device) -> None:
     """The kernel that traces blocks of paths on CPUs, and the wavefront of all other devices."""
     if not traces_in_blocks(device):
         pytest.skip("no blocks on this device")
     images = []
     for in_blocks in (False, True):
-        session = Session(mixed_scene(base_nor=8), device=device)
+        session = Session(small(make), device=device)
         session._wavefront.in_blocks = in_blocks
         session.render(8)
         images.append(session.image())
@@ -182,14 +190,15 @@ def test_blocks_and_wavefront_agree(device: Device) -> None:
     assert images[0].mean() == pytest.approx(images[1].mean(), rel=1e-3)
 
 
+@pytest.mark.parametrize("make", [mixed_scene, cornell, glass, plates], ids=lambda make: make.__name__)
 def test_blocks_are_the_same_without_instructions_of_avx512(
-    device: Device, monkeypatch: pytest.MonkeyPatch
+    make: Callable[[], Scene], device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not traces_in_blocks(device):
         pytest.skip("no blocks on this device")
     images = []
     for _ in range(2):
-        session = Session(mixed_scene(base_nor=8), device=device)
+        session = Session(small(make), device=device)
         session.render(8)
         images.append(session.image())
         portable = (*session._device_scene.variant, "PORTABLE_LANES")
@@ -246,6 +255,8 @@ VARIANTS = [
     (*LIGHTS, "MEDIA", *RESTRICTIONS),
     (*LIGHTS, *RESTRICTIONS[:3]),
     (*LIGHTS, *RESTRICTIONS[1:2]),
+    ("TRIANGLE_LIGHTS", "MEDIA", *RESTRICTIONS, "PORTABLE_LANES"),
+    ("TRIANGLE_LIGHTS", "PORTABLE_LANES"),
 ]
 
 
