@@ -12,10 +12,16 @@
 // Planes of what the sweep finds.
 #define SWEEP_DISTANCE 0
 #define SWEEP_WEIGHT 1
-#define SWEEP_PLACE 4 // of the facet
+#define SWEEP_PLACE 4 // of the facet, or SWEEP_SIDE and more
+
+// A place with this bit is that of the first of two opposite sides of a parallelepiped, and the weights are
+// local coordinates. Above SWEEP_AXIS stands the axis along which they are opposite.
+#define SWEEP_SIDE 0x80000000u
+#define SWEEP_AXIS 29
 
 typedef struct {
     __global const Facet *facets;
+    __global const Solid *solids;
     __global const Cluster *clusters;
     uint cluster_count; // at most 32, of which rays meet the last without asking for its box
 } Sweep;
@@ -50,7 +56,7 @@ INLINE int16 sweep_box(__global const float *bounds, const uint *axes, const flo
 
 // Sixteen rays in the axes of the test, and the nearest facets that they have met so far.
 typedef struct {
-    float16 origin[3], shear[3];
+    float16 origin[3], direction[3], shear[3];
     float16 limit, weight[3];
     uint16 place;
 } SweepGroup;
@@ -96,6 +102,47 @@ INLINE void sweep_facet(SweepGroup *group, __global const Facet *facet, uint ind
     group->weight[2] = met ? w : group->weight[2];
 }
 
+// Tests the rays against a parallelepiped, as against a box with slabs (Kay and Kajiya 1986) in its own
+// coordinates. Rays that start inside meet the side where they leave.
+INLINE void sweep_solid(SweepGroup *group, __global const Solid *solid, const uint *axes, const bool any) {
+    float16 away[3], start[3], step[3], entry[3], exit[3];
+#pragma unroll
+    for (uint i = 0; i < 3; i++)
+        away[i] = group->origin[i] - solid->corner[axes[i]];
+#pragma unroll
+    for (uint k = 0; k < 3; k++) {
+        __global const float *row = solid->local_from_world + 3 * k;
+        start[k] = row[axes[0]] * away[0] + row[axes[1]] * away[1] + row[axes[2]] * away[2];
+        step[k] = row[axes[0]] * group->direction[0] + row[axes[1]] * group->direction[1] +
+                  row[axes[2]] * group->direction[2];
+        // Both as products: along a side, where `inverse` is infinite, a sum would be no number.
+        const float16 inverse = 1.0f / step[k];
+        const float16 first = -start[k] * inverse, second = (1.0f - start[k]) * inverse;
+        entry[k] = BVH_MIN8(first, second);
+        exit[k] = BVH_MAX8(first, second);
+    }
+    const float16 near = BVH_MAX8(BVH_MAX8(entry[0], entry[1]), entry[2]);
+    const float16 far = BVH_MIN8(BVH_MIN8(exit[0], exit[1]), exit[2]);
+    const int16 inside = near <= 0.0f;
+    const float16 distance = inside ? far : near;
+    const int16 met = (near <= far) & (distance > 0.0f) & (distance < group->limit);
+    if (any) {
+        group->place = met ? (uint16)(0) : group->place;
+        return;
+    }
+    const int16 on_first = (inside ? exit[0] : entry[0]) == distance;
+    const int16 on_second = (inside ? exit[1] : entry[1]) == distance;
+    const uint base = solid->first_side | SWEEP_SIDE;
+    uint16 place =
+        on_second ? (uint16)(base + 2u + (1u << SWEEP_AXIS)) : (uint16)(base + 4u + (2u << SWEEP_AXIS));
+    place = on_first ? (uint16)(base) : place;
+    group->place = met ? place : group->place;
+    group->limit = met ? distance : group->limit;
+#pragma unroll
+    for (uint k = 0; k < 3; k++)
+        group->weight[k] = met ? start[k] + distance * step[k] : group->weight[k];
+}
+
 // The clusters, a bit for each, whose boxes some ray of the group meets, and the last.
 INLINE uint sweep_clusters(const Sweep *sweep, const SweepGroup *group, const uint *axes) {
     float16 inverse[3], near_shift[3], far_shift[3];
@@ -135,14 +182,17 @@ INLINE void sweep_group(const Sweep *sweep, __local const float *rays, uint axis
 #pragma unroll
     for (uint i = 0; i < 3; i++) {
         group.origin[i] = load_lanes(rays + axes[i] * BLOCK_STRIDE);
+        group.direction[i] = load_lanes(rays + (3 + axes[i]) * BLOCK_STRIDE);
         if (i < 2)
-            group.shear[i] = load_lanes(rays + (3 + axes[i]) * BLOCK_STRIDE) * group.shear[2];
+            group.shear[i] = group.direction[i] * group.shear[2];
         group.weight[i] = 0.0f;
     }
     group.limit = any ? load_lanes(rays + 6 * BLOCK_STRIDE) : INFINITY;
     group.place = NO_INDEX;
     for (uint waiting = sweep_clusters(sweep, &group, axes); waiting; waiting &= waiting - 1) {
         __global const Cluster *cluster = sweep->clusters + BVH_FIRST_BIT(waiting);
+        for (uint i = cluster->first_solid; i < cluster->solid_end; i++)
+            sweep_solid(&group, sweep->solids + i, axes, any);
         uint i = cluster->first;
         for (; i < cluster->first_triangle; i++)
             sweep_facet(&group, sweep->facets + i, i, axes, false, any);

@@ -118,18 +118,33 @@ STAGE uint gather_live(Block *block, uint count, Picked *kinds) {
 }
 
 #ifdef FEW_ON_TOP
+// Weights of the corners A, B and C of a side of a parallelepiped; `at`: local coordinates.
+INLINE Vec3 side_weights(uint turns, Vec3 at) {
+    uint along = turns >> 4;
+    float to_b = bvh_component(at, along & 3u), to_d = bvh_component(at, along >> 3 & 3u);
+    to_b = along & 4u ? 1.0f - to_b : to_b;
+    to_d = along & 32u ? 1.0f - to_d : to_d;
+    return vec3(1.0f - to_b, to_b - to_d, to_d);
+}
+
 // Of a parallelogram ABCD the sweep leaves the weights of A, B and C, where that of B is against the others
 // in the half ACD: as B is A + C - D, those of A, C and D follow.
 INLINE void keep_swept(const Sweep *sweep, const State *state, __local const float *found, uint path) {
-    uint index = load_bits(found, SWEEP_PLACE * BLOCK_STRIDE + path);
-    int met = index != NO_INDEX;
-    __global const Facet *facet = sweep->facets + (met ? index : 0u);
+    uint place = load_bits(found, SWEEP_PLACE * BLOCK_STRIDE + path);
     Vec3 weight = load3(found + SWEEP_WEIGHT * BLOCK_STRIDE, BLOCK_STRIDE, path);
+    int met = place != NO_INDEX;
+    int side = met & ((place & SWEEP_SIDE) != 0u);
+    uint index = side ? place & ((1u << SWEEP_AXIS) - 1u) : met ? place : 0u;
+    int opposite = side & (bvh_component(weight, place >> SWEEP_AXIS & 3u) > 0.5f);
+    index += opposite ? 1u : 0u;
+    __global const Facet *facet = sweep->facets + index;
+    uint turns = facet->turns;
+    weight = choose(side, side_weights(turns, weight), weight);
     float others = weight.x + weight.z;
     int second = ((weight.y < 0.0f) & (others > 0.0f)) | ((weight.y > 0.0f) & (others < 0.0f));
     weight = choose(second, vec3(weight.x + weight.y, weight.z + weight.y, -weight.y), weight);
     uint triangle = second ? facet->place[1] : facet->place[0];
-    uint corner = second ? facet->turns >> 2 : facet->turns & 3u;
+    uint corner = (second ? turns >> 2 : turns) & 3u;
     state->hits[HIT_DISTANCE * BLOCK_STRIDE + path] = found[SWEEP_DISTANCE * BLOCK_STRIDE + path];
     store_bits(state->hits, HIT_OBJECT * BLOCK_STRIDE + path, met ? facet->object : NO_INDEX);
     store_bits(state->hits, HIT_TRIANGLE * BLOCK_STRIDE + path, met ? triangle : NO_INDEX);
@@ -402,7 +417,7 @@ INLINE void trace_block(Block *block, uint first, uint count) {
         __global const float *environment_pdf, __local float *rays, __local float *paths,                    \
         __local float *shadows_and_hits, __local float *radiance, __local uint *list, __local uint *words,   \
         __local uint *rows, __local float *spare, __global const Facet *facets,                              \
-        __global const Cluster *clusters, const uint cluster_count
+        __global const Solid *solids, __global const Cluster *clusters, const uint cluster_count
 
 #define BLOCK(params, slots)                                                                                 \
     {params,                                                                                                 \
@@ -410,7 +425,7 @@ INLINE void trace_block(Block *block, uint first, uint count) {
      {top_nodes, top_packs, nodes, packs, objects, normals},                                                 \
      {materials, lights, environment_image, environment_marginal, environment_conditional, environment_pdf}, \
      layers,                                                                                                 \
-     {facets, clusters, cluster_count},                                                                      \
+     {facets, solids, clusters, cluster_count},                                                              \
      {rays, paths, shadows_and_hits + SHADOW_PLANES * BLOCK_STRIDE, shadows_and_hits, radiance},             \
      rays,                                                                                                   \
      paths,                                                                                                  \

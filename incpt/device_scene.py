@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
-from incpt import albedo, bvh, facets, layout, lights, transform
+from incpt import albedo, bvh, clusters, facets, layout, lights, transform
 from incpt.device import Device
 from incpt.scene import Change, Mesh, Object, Scene, Vector, diff
 
@@ -196,19 +196,20 @@ class DeviceScene:
         self._few_on_top = triangles is not None and len(triangles.packs) <= _FEW_PACKS
         self._upload("top_nodes", bvh.build_top_with_triangles(self.device, bounds, others, triangles))
         self._upload("top_packs", _joined([triangles.packs] if triangles else [], layout.TRIANGLE_PACK))
-        rows, clusters = np.zeros(1, layout.FACET), np.zeros(0, layout.CLUSTER)
+        swept = clusters.arrange([], np.zeros(0, np.bool_))
         self._buffers["block_nodes"] = self._buffers["top_nodes"]
         if triangles is not None and self._few_on_top:
             # Blocks of paths meet those triangles without a tree, and take it for the other objects alone.
             parts = [
-                facets.Part(self._facets_of(objects[i].mesh), own, i, place)
+                clusters.Part(self._facets_of(objects[i].mesh), own, i, place)
                 for (i, own), place in zip(vertices.items(), places, strict=True)
             ]
-            rows, clusters = facets.arrange(parts, np.isnan(triangles.packs["vertex"][:, 0]).ravel())
+            swept = clusters.arrange(parts, np.isnan(triangles.packs["vertex"][:, 0]).ravel())
             self._upload("block_nodes", bvh.build_top_with_triangles(self.device, bounds, others, None))
-        self.cluster_count = len(clusters)
-        self._upload("facets", _joined([rows], layout.FACET))
-        self._upload("clusters", _joined([clusters], layout.CLUSTER))
+        self.cluster_count = len(swept.clusters)
+        self._upload("facets", _joined([swept.facets], layout.FACET))
+        self._upload("solids", _joined([swept.solids], layout.SOLID))
+        self._upload("clusters", swept.clusters)
 
     def _triangles_on_top(
         self, vertices: dict[int, npt.NDArray[np.float32]]
@@ -234,7 +235,7 @@ class DeviceScene:
 
     def _facets_of(self, mesh: Mesh) -> facets.Facets:
         if mesh not in self._facets:
-            self._facets[mesh] = facets.pair_faces(mesh)
+            self._facets[mesh] = facets.find_facets(mesh)
         return self._facets[mesh]
 
     def _build_environment(self) -> None:

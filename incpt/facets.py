@@ -1,34 +1,27 @@
-"""The facets of a few triangles: parallelograms where two of them make one up, single triangles elsewhere.
+"""The facets of a mesh of few triangles: parallelograms where two of them make one up, single triangles
+elsewhere; and the parallelepipeds that six parallelograms make up.
 
 Blocks of paths meet a small top level without a tree (cl/sweep.cl). There a parallelogram costs a ray little
-more than one triangle, and what people build of few triangles is mostly rectangles. The facets stand in
-clusters with a box each, so that rays pass by those that they cannot meet.
+more than one triangle, a parallelepiped little more than one of its sides; and what people build of few
+triangles is mostly rectangles and boxes.
 """
 
 from __future__ import annotations
 
-import functools
-import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from incpt import layout
 from incpt.scene import Mesh
 
-MOST_CLUSTERS = 32
-"""The sweep keeps a bit for each."""
+SIDES = 6
+"""Of a parallelepiped."""
 
 _TOLERANCE = 2.0**-22
 """How far corners may be off a parallelogram, relative to the largest coordinate: what rounding makes."""
 _MOST_IN_A_GROUP = 8
-_BOX_COST = 0.4
-"""Of testing a box, in tests of a facet (instructions counted)."""
-_RAYS = 16
-"""That are tested together: they go into a box if one of them meets it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +32,21 @@ class Facets:
     faces    (F, 2) int32: the face with corners A, B, C, and the one with A, C, D; the same one for a single
              triangle.
     turns    (F, 2) uint32: which corner of these faces A is.
-    groups   where facets begin that lie near each other, parallelograms before triangles.
+    along    (F,) uint32: for a side of a parallelepiped, which of its axes lead from A to B and from A to D:
+             their numbers in bits 0 and 1, 3 and 4; bits 2 and 5 are set where they lead backwards.
+    loose    the number of facets that belong to no parallelepiped. Behind them stand the sides of each: where
+             its first axis is 0, where that is 1, where its second axis is 0 ...
+    solids   (S, 4) int32 indices of vertices: a corner of each parallelepiped and the ends of its axes.
+    groups   where facets begin that lie near each other, parallelograms before triangles; the sides of a
+             parallelepiped are one.
     """
 
     corners: npt.NDArray[np.int32]
     faces: npt.NDArray[np.int32]
     turns: npt.NDArray[np.uint32]
+    along: npt.NDArray[np.uint32]
+    loose: int
+    solids: npt.NDArray[np.int32]
     groups: tuple[int, ...]
 
 
@@ -57,7 +59,7 @@ class _Pair(NamedTuple):
     other_corner: int
 
 
-def pair_faces(mesh: Mesh) -> Facets:
+def find_facets(mesh: Mesh) -> Facets:
     """The facets of a mesh."""
     pairs = _chosen(_parallelograms(mesh))
     alone = set(range(len(mesh.faces))) - {f for pair in pairs for f in (pair.face, pair.other)}
@@ -66,10 +68,76 @@ def pair_faces(mesh: Mesh) -> Facets:
     first = mesh.faces[faces[:, :1], (turns[:, :1] + np.arange(3)) % 3]
     last = mesh.faces[faces[:, 1], (turns[:, 1] + 2) % 3]
     corners = np.column_stack([first, last]).astype(np.int32)
-    groups = _groups(mesh.vertices[corners].mean(axis=1), np.arange(len(corners)))
-    order = np.concatenate(groups)
-    starts = np.cumsum([0, *map(len, groups[:-1])])
-    return Facets(corners[order], faces[order], turns[order].astype(np.uint32), tuple(starts.tolist()))
+
+    solids = _solids(mesh, corners[: len(pairs)])
+    sides = [side for solid in solids for side in solid.sides]
+    loose = np.setdiff1d(np.arange(len(corners)), np.array(sides, np.intp))
+    groups = _groups(mesh.vertices[corners].mean(axis=1), loose)
+    order = np.concatenate([*groups, np.array(sides, np.intp)])
+    starts = np.cumsum([0, *map(len, groups), *[SIDES] * len(solids)])[:-1]
+    along = np.zeros(len(corners), np.uint32)
+    along[sides] = [bits for solid in solids for bits in solid.along]
+    return Facets(
+        corners[order],
+        faces[order],
+        turns[order].astype(np.uint32),
+        along[order],
+        len(loose),
+        np.array([solid.vertices for solid in solids], np.int32).reshape(-1, 4),
+        tuple(starts.tolist()),
+    )
+
+
+class _Solid(NamedTuple):
+    """A parallelepiped: its sides as indices of facets, and the rest as `Facets` has it."""
+
+    sides: tuple[int, ...]
+    along: tuple[int, ...]
+    vertices: tuple[int, ...]
+
+
+def _solids(mesh: Mesh, corners: npt.NDArray[np.int32]) -> list[_Solid]:
+    """Those among parallelograms with these corners (F, 4) that share no corner with others."""
+    points = _same_points(mesh.vertices)[corners]
+    bodies: dict[int, set[int]] = {}  # facets, by each point that they share
+    for f, own in enumerate(points.tolist()):
+        body = set.union({f}, *(bodies.get(point, set()) for point in own))
+        for member in body:
+            bodies.update(dict.fromkeys(points[member].tolist(), body))
+    found = {id(body): body for body in bodies.values() if len(body) == SIDES}
+    solids = (_solid(mesh, corners, points, sorted(body)) for body in found.values())
+    return [solid for solid in solids if solid is not None]
+
+
+def _solid(
+    mesh: Mesh, corners: npt.NDArray[np.int32], points: npt.NDArray[np.intp], body: list[int]
+) -> _Solid | None:
+    """The parallelepiped that six parallelograms make up, if they do."""
+    origin = int(points[body[0], 0])
+    vertex = dict(zip(points[body].ravel().tolist(), corners[body].ravel().tolist(), strict=True))
+    ends = {int(points[f, (k + step) % 4]) for f in body for k in range(4) for step in (1, 3)
+            if points[f, k] == origin}  # fmt: skip
+    if len(vertex) != 8 or len(ends) != 3:
+        return None
+    vertices = [vertex[point] for point in (origin, *sorted(ends))]
+    position = mesh.vertices.astype(np.float64)
+    axes = position[vertices[1:]] - position[vertices[0]]
+    if np.linalg.matrix_rank(axes) < 3:
+        return None
+    local = np.rint(
+        np.linalg.solve(axes.T, (position[corners[body]] - position[vertices[0]]).reshape(-1, 3).T).T
+    )
+    away = local @ axes + position[vertices[0]] - position[corners[body]].reshape(-1, 3)
+    if np.abs(away).max() > _TOLERANCE * np.abs(mesh.bounds).max() or set(local.ravel()) != {0, 1}:
+        return None
+    sides, along = [-1] * SIDES, [0] * SIDES
+    for f, (a, b, _, d) in zip(body, local.reshape(-1, 4, 3).astype(int), strict=True):
+        to_b, to_d = (int(np.flatnonzero(corner - a)[0]) for corner in (b, d))
+        axis = 3 - to_b - to_d
+        side = 2 * axis + int(a[axis])
+        sides[side] = f
+        along[side] = to_b | int(a[to_b]) << 2 | to_d << 3 | int(a[to_d]) << 5
+    return _Solid(tuple(sides), tuple(along), tuple(vertices)) if -1 not in sides else None
 
 
 def _chosen(possible: list[_Pair]) -> list[_Pair]:
@@ -118,133 +186,8 @@ def _same_points(vertices: npt.NDArray[np.float32]) -> npt.NDArray[np.intp]:
 def _groups(centers: npt.NDArray[np.float32], members: npt.NDArray[np.intp]) -> list[npt.NDArray[np.intp]]:
     """Halves of halves along the widest axis, until they are small; in each the order is kept."""
     if len(members) <= _MOST_IN_A_GROUP:
-        return [np.sort(members)]
+        return [np.sort(members)] if len(members) else []
     own = centers[members]
     ordered = members[np.argsort(own[:, np.ptp(own, axis=0).argmax()], kind="stable")]
     middle = len(ordered) // 2
     return _groups(centers, ordered[:middle]) + _groups(centers, ordered[middle:])
-
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """What one object brings along: its facets, the world-space vertices (V, 3) of its mesh, its index, and
-    the place of each of its faces in the packs (N,), as HIT_TRIANGLE has it."""
-
-    facets: Facets
-    vertices: npt.NDArray[np.float32]
-    index: int
-    places: npt.NDArray[np.uint32]
-
-
-def arrange(
-    parts: Sequence[Part], flat: npt.NDArray[np.bool_]
-) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
-    """The layout.FACET of all parts, and the layout.CLUSTER over them.
-
-    The box of the last cluster is not worth asking: nearly all rays would meet it. It may be empty. `flat`
-    (8 * P,) tells of each place in the packs whether a face without area is there, which no ray meets.
-    """
-    rows = np.concatenate([_rows(part) for part in parts])
-    group = np.cumsum(np.concatenate([_starts(part.facets) for part in parts])) - 1
-    kept = ~flat[rows["place"] & ~np.uint32(layout.NODE_PACK)].any(axis=1)
-    rows, group = rows[kept], np.unique(group[kept], return_inverse=True)[1]
-    boxes = _boxes(rows, group)
-    around = functools.reduce(_Box.joined, boxes).area if boxes else 0.0
-    clusters = _clustered(boxes, around)
-    boxed = [cluster for cluster in clusters if cluster.box_pays(around)]
-    number = np.full(len(boxes), len(boxed))
-    for i, cluster in enumerate(boxed):
-        number[list(cluster.groups)] = i
-    single = rows["place"][:, 0] == rows["place"][:, 1]
-    order = np.lexsort([single, number[group]])
-    table = np.zeros(len(boxed) + 1, layout.CLUSTER)
-    for row, cluster in zip(table, boxed, strict=False):
-        row["bounds"] = np.stack([cluster.least, cluster.greatest], axis=-1).ravel()
-    table["end"] = np.cumsum(np.bincount(number[group], minlength=len(table)))
-    table["first"][1:] = table["end"][:-1]
-    table["first_triangle"] = table["end"] - np.bincount(number[group[single]], minlength=len(table))
-    return rows[order], table
-
-
-def _rows(part: Part) -> npt.NDArray[np.void]:
-    rows = np.zeros(len(part.facets.faces), layout.FACET)
-    rows["vertex"] = part.vertices[part.facets.corners].reshape(-1, 12)
-    rows["place"] = part.places[part.facets.faces]
-    rows["object"] = part.index
-    rows["turns"] = part.facets.turns[:, 0] | part.facets.turns[:, 1] << np.uint32(2)
-    return rows
-
-
-def _starts(own: Facets) -> npt.NDArray[np.bool_]:
-    starts = np.zeros(len(own.faces), np.bool_)
-    starts[list(own.groups)] = True
-    return starts
-
-
-@dataclass(frozen=True)
-class _Box:
-    """Around `count` facets, those of some groups."""
-
-    groups: tuple[int, ...]
-    count: int
-    least: tuple[float, ...]
-    greatest: tuple[float, ...]
-
-    @property
-    def area(self) -> float:
-        """Half of it."""
-        x, y, z = (high - low for low, high in zip(self.least, self.greatest, strict=True))
-        return x * y + y * z + z * x
-
-    def joined(self, other: _Box) -> _Box:
-        return _Box(
-            self.groups + other.groups,
-            self.count + other.count,
-            tuple(map(min, self.least, other.least)),
-            tuple(map(max, self.greatest, other.greatest)),
-        )
-
-    def box_pays(self, around: float) -> bool:
-        """Whether it is cheaper to ask for the box first, for rays that go about in one of area `around`."""
-        return self._cost_if_boxed(around) < self.count
-
-    def cost(self, around: float) -> float:
-        """What such rays pay for the facets, and for the box if it pays."""
-        return min(self._cost_if_boxed(around), self.count)
-
-    def _cost_if_boxed(self, around: float) -> float:
-        share = min(self.area / around, 1.0) if around > 0 else 1.0
-        return _BOX_COST + self.count * (1 - (1 - share) ** _RAYS)
-
-
-def _boxes(rows: npt.NDArray[np.void], group: npt.NDArray[np.intp]) -> list[_Box]:
-    if len(rows) == 0:
-        return []
-    starts = np.flatnonzero(np.diff(group, prepend=-1))
-    corners = rows["vertex"].reshape(-1, 4, 3)
-    least = np.minimum.reduceat(corners.min(axis=1), starts).tolist()
-    greatest = np.maximum.reduceat(corners.max(axis=1), starts).tolist()
-    counts = np.bincount(group).tolist()
-    return [
-        _Box((i,), count, tuple(low), tuple(high))
-        for i, (count, low, high) in enumerate(zip(counts, least, greatest, strict=True))
-    ]
-
-
-def _clustered(boxes: Sequence[_Box], around: float) -> list[_Box]:
-    """Neighbours in the order of the objects become one cluster where that is cheaper, or where there would
-    be too many."""
-    done: list[_Box] = []
-    for box in boxes:
-        last = box
-        while done and done[-1].joined(last).cost(around) <= done[-1].cost(around) + last.cost(around):
-            last = done.pop().joined(last)
-        done.append(last)
-    while len(done) >= MOST_CLUSTERS:
-        both = [a.joined(b) for a, b in itertools.pairwise(done)]
-        i = min(
-            range(len(both)),
-            key=lambda i: both[i].cost(around) - done[i].cost(around) - done[i + 1].cost(around),
-        )
-        done[i : i + 2] = [both[i]]
-    return done

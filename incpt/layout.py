@@ -231,14 +231,28 @@ FACET = _packed(
         # Places of the triangles ABC and ACD in the packs of the top level, as HIT_TRIANGLE has it.
         ("place", np.uint32, (2,)),
         ("object", np.uint32),
-        ("turns", np.uint32),  # which corner of these triangles A is, two bits each
+        # Which corner of these triangles A is, two bits each; above them, for a side of a parallelepiped,
+        # `Facets.along`.
+        ("turns", np.uint32),
+    ]
+)
+
+SOLID = _packed(
+    [
+        # A parallelepiped in world space. Its local coordinates are between 0 and 1 inside.
+        ("corner", np.float32, (3,)),
+        ("local_from_world", np.float32, (9,)),  # 3 x 3, row by row, of the way from that corner
+        ("first_side", np.uint32),  # of six facets: where local x is 0, where it is 1, where y is 0 ...
     ]
 )
 
 CLUSTER = _packed(
     [
-        # Facets that stand together: least and greatest x, y and z; parallelograms, then triangles.
+        # Facets that stand together: least and greatest x, y and z; parallelepipeds; parallelograms, then
+        # triangles.
         ("bounds", np.float32, (6,)),
+        ("first_solid", np.uint32),
+        ("solid_end", np.uint32),
         ("first", np.uint32),
         ("first_triangle", np.uint32),
         ("end", np.uint32),
@@ -328,6 +342,7 @@ STRUCTS: dict[str, np.dtype[np.void]] = {
     "Node": NODE,
     "TrianglePack": TRIANGLE_PACK,
     "Facet": FACET,
+    "Solid": SOLID,
     "Cluster": CLUSTER,
     "Object": OBJECT,
     "Material": MATERIAL,

@@ -50,7 +50,7 @@ def block_arguments(scene: DeviceScene) -> list[Any]:
     memory = [cl.LocalMemory(4 * n * layout.BLOCK_STRIDE) for n in _BLOCK_PLANES]
     return [
         scene.buffer("block_nodes"), *scene.geometry[1:], scene.buffer("normals"), scene.buffer("layers"),
-        *scene.emitters, *memory, scene.buffer("facets"), scene.buffer("clusters"),
+        *scene.emitters, *memory, *map(scene.buffer, ("facets", "solids", "clusters")),
         np.uint32(scene.cluster_count),
     ]  # fmt: skip
 

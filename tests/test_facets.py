@@ -1,4 +1,4 @@
-"""Parallelograms among few triangles, and the sweep of rays over them."""
+"""Parallelograms and parallelepipeds among few triangles, and the sweep of rays over them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from incpt import facets, layout, transform
+from incpt import clusters, facets, layout, transform
 from incpt.device import Device
 from incpt.device_scene import DeviceScene
 from incpt.layout import HitPlane
@@ -77,12 +77,79 @@ def check_facets(mesh: Mesh, own: facets.Facets) -> int:
         np.testing.assert_array_equal(found[chosen], mesh.vertices[corners][chosen])
     assert (own.corners[~pairs, 2] == own.corners[~pairs, 3]).all()
     assert own.groups[0] == 0 and max(np.diff([*own.groups, len(own.faces)])) <= 8
+    check_sides(mesh, own)
     return int(pairs.sum())
 
 
-def test_a_cube_is_six_parallelograms() -> None:
-    mesh = shape("cube")
-    assert check_facets(mesh, facets.pair_faces(mesh)) == 6
+def check_sides(mesh: Mesh, own: facets.Facets) -> None:
+    """Sides stand in order, and local axes lead from A to B and to D as they are said to."""
+    assert len(own.faces) == own.loose + 6 * len(own.solids)
+    assert (own.along[: own.loose] == 0).all()
+    position = mesh.vertices.astype(np.float64)
+    for solid, first in zip(own.solids, range(own.loose, len(own.faces), 6), strict=True):
+        axes = position[solid[1:]] - position[solid[0]]
+        for side in range(6):
+            local = np.linalg.solve(axes.T, (position[own.corners[first + side]] - position[solid[0]]).T).T
+            np.testing.assert_allclose(local[:, side // 2], side % 2, atol=1e-5)
+            for bits, corner in ((own.along[first + side] & 7, 1), (own.along[first + side] >> 3, 3)):
+                expected = np.zeros(3)
+                expected[bits & 3] = -1 if bits & 4 else 1
+                np.testing.assert_allclose(local[corner] - local[0], expected, atol=1e-5)
+
+
+def sheared(mesh: Mesh, matrix: Any) -> Mesh:
+    return Mesh((mesh.vertices @ np.array(matrix, float).T).astype(np.float32), mesh.faces)
+
+
+@pytest.mark.parametrize(
+    "matrix", [np.eye(3), np.diag([-2, 3, 0.1]), [[1, 0.3, 0], [0, 2, 0.7], [0.1, 0, 1]]]
+)
+@pytest.mark.parametrize("seed", [None, 1, 2])
+def test_a_cube_is_a_parallelepiped(matrix: Any, seed: int | None) -> None:
+    mesh = sheared(shape("cube"), matrix)
+    if seed is not None:
+        mesh = turned(mesh, seed)
+    own = facets.find_facets(mesh)
+    assert check_facets(mesh, own) == 6
+    assert own.loose == 0 and len(own.solids) == 1
+
+
+def joined(*meshes: Mesh) -> Mesh:
+    firsts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [mesh.faces + first for mesh, first in zip(meshes, firsts, strict=False)]
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+
+
+def moved(mesh: Mesh, *by: float) -> Mesh:
+    return Mesh(mesh.vertices + np.float32(by), mesh.faces)
+
+
+def test_parallelepipeds_beside_other_facets() -> None:
+    mesh = joined(moved(grid(3, 2), 5, 0, 0), shape("cube"), soup(3, 1), moved(shape("cube"), 0, 3, 0))
+    own = facets.find_facets(mesh)
+    assert check_facets(mesh, own) == 6 + 12
+    assert own.loose == 6 + 3 and len(own.solids) == 2
+
+
+_CUBE = shape("cube")
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        Mesh(_CUBE.vertices, _CUBE.faces[:-2]),  # open
+        Mesh(_CUBE.vertices, _CUBE.faces[:-1]),
+        joined(_CUBE, moved(_CUBE, 1, 1, 1)),  # two that share a corner
+        joined(_CUBE, moved(_CUBE, 1, 0, 0)),
+        Mesh(_CUBE.vertices * np.where(_CUBE.vertices[:, 1:2] > 0, [0.5, 1, 0.5], 1), _CUBE.faces),
+        sheared(_CUBE, np.diag([1, 0, 1])),  # flat
+    ],
+    ids=["open", "half", "corner", "side", "frustum", "flat"],
+)
+def test_what_is_no_parallelepiped(mesh: Mesh) -> None:
+    own = facets.find_facets(mesh)
+    check_facets(mesh, own)
+    assert len(own.solids) == 0 and own.loose == len(own.faces)
 
 
 @given(st.integers(1, 6), st.integers(1, 6), st.sampled_from([0.0, 0.3, -1.7]), st.integers(0, 99))
@@ -90,13 +157,13 @@ def test_nets_pair_up_whatever_corner_faces_start_with(
     columns: int, rows: int, skew: float, seed: int
 ) -> None:
     mesh = turned(grid(columns, rows, skew), seed)
-    assert check_facets(mesh, facets.pair_faces(mesh)) >= 0.9 * columns * rows
+    assert check_facets(mesh, facets.find_facets(mesh)) >= 0.9 * columns * rows
 
 
 @given(st.integers(1, 40), st.integers(0, 99))
 def test_triangles_that_share_nothing_stay_alone(count: int, seed: int) -> None:
     mesh = soup(count, seed)
-    assert check_facets(mesh, facets.pair_faces(mesh)) == 0
+    assert check_facets(mesh, facets.find_facets(mesh)) == 0
 
 
 @pytest.mark.parametrize(
@@ -110,12 +177,12 @@ def test_triangles_that_share_nothing_stay_alone(count: int, seed: int) -> None:
 )
 def test_what_is_no_parallelogram(faces: list[list[int]]) -> None:
     points = np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0.5, 0], [0, 1, 1e-3]])
-    assert check_facets(Mesh(points, faces), facets.pair_faces(Mesh(points, faces))) == 0
+    assert check_facets(Mesh(points, faces), facets.find_facets(Mesh(points, faces))) == 0
 
 
 def test_half_a_parallelogram_in_large_coordinates_is_told_by_its_rounding() -> None:
     far = Mesh(grid(2, 2).vertices * np.float32(1e-3) + np.float32(1000.1), grid(2, 2).faces)
-    assert check_facets(far, facets.pair_faces(far)) == 4
+    assert check_facets(far, facets.find_facets(far)) == 4
 
 
 # ------------------------------------------------------------------------------------------- clusters
@@ -125,15 +192,42 @@ def scene_of(objects: Sequence[Object]) -> Scene:
     return Scene(Camera(), Environment(color=(1, 1, 1)), {"white": Material()}, tuple(objects))
 
 
-def arranged(device: Device, scene: Scene) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
-    """FACET and CLUSTER as they are on the device."""
+def arranged(device: Device, scene: Scene) -> dict[str, npt.NDArray[np.void]]:
+    """FACET, SOLID and CLUSTER as they are on the device."""
     described = DeviceScene(device, scene)
-    tables = []
-    for name, dtype in (("facets", layout.FACET), ("clusters", layout.CLUSTER)):
+    tables = {}
+    for name, dtype in (("facets", layout.FACET), ("solids", layout.SOLID), ("clusters", layout.CLUSTER)):
         buffer = described.buffer(name)
-        tables.append(device.read(buffer, np.empty(buffer.size // dtype.itemsize, dtype)))
-    assert described.cluster_count == len(tables[1])
-    return tables[0], tables[1]
+        tables[name] = device.read(buffer, np.empty(buffer.size // dtype.itemsize, dtype))
+    assert described.cluster_count == len(tables["clusters"])
+    return tables
+
+
+def check_tables(tables: dict[str, npt.NDArray[np.void]], loose: int, solids: int) -> None:
+    rows, table = tables["facets"], tables["clusters"]
+    assert len(table) <= clusters.MOST_CLUSTERS
+    for first, end, count in (("first", "end", loose), ("first_solid", "solid_end", solids)):
+        assert table[first].tolist() == [0, *table[end][:-1].tolist()] and table[end][-1] == count
+    assert tables["solids"]["first_side"][:solids].tolist() == [loose + 6 * i for i in range(solids)]
+    for solid in tables["solids"][:solids]:
+        away = (
+            rows["vertex"][solid["first_side"] : solid["first_side"] + 6].reshape(6, 4, 3) - solid["corner"]
+        )
+        local = away @ solid["local_from_world"].reshape(3, 3).T
+        for side in range(6):
+            np.testing.assert_allclose(local[side, :, side // 2], side % 2, atol=1e-3)
+    for i, cluster in enumerate(table):
+        first, middle, end = (int(cluster[name]) for name in ("first", "first_triangle", "end"))
+        single = rows["place"][first:end, 0] == rows["place"][first:end, 1]
+        np.testing.assert_array_equal(single, np.arange(first, end) >= middle)
+        sides = [
+            rows["vertex"][side : side + 6]
+            for side in tables["solids"]["first_side"][cluster["first_solid"] : cluster["solid_end"]]
+        ]
+        corners = np.concatenate([rows["vertex"][first:end], *sides]).reshape(-1, 3)
+        if i < len(table) - 1:
+            least, greatest = cluster["bounds"].reshape(3, 2).T
+            assert (corners.min(axis=0) == least).all() and (corners.max(axis=0) == greatest).all()
 
 
 @settings(max_examples=25, deadline=None)
@@ -148,41 +242,41 @@ def test_every_facet_is_in_a_cluster(device: Device, planes: int, cubes: int, al
         for i, mesh in enumerate(meshes)
     ]
     scene = scene_of(objects)
-    described = DeviceScene(device, scene)
-    if "FEW_ON_TOP" not in described.variant:
+    if "FEW_ON_TOP" not in DeviceScene(device, scene).variant:
         return
-    rows, clusters = arranged(device, scene)
-    assert len(clusters) <= facets.MOST_CLUSTERS
-    assert len(rows) == planes + 6 * cubes + alone
-    assert clusters["first"].tolist() == [0, *clusters["end"][:-1].tolist()] and clusters["end"][-1] == len(
-        rows
-    )
-    for cluster in clusters:
-        first, middle, end = (int(cluster[name]) for name in ("first", "first_triangle", "end"))
-        single = rows["place"][first:end, 0] == rows["place"][first:end, 1]
-        np.testing.assert_array_equal(single, np.arange(first, end) >= middle)
-    for cluster in clusters[:-1]:
-        corners = rows["vertex"][cluster["first"] : cluster["end"]].reshape(-1, 3)
-        least, greatest = cluster["bounds"].reshape(3, 2).T
-        assert (corners.min(axis=0) == least).all() and (corners.max(axis=0) == greatest).all()
+    tables = arranged(device, scene)
+    assert len(tables["facets"]) == planes + 6 * cubes + alone
+    check_tables(tables, planes + alone, cubes)
+
+
+def test_a_parallelepiped_that_is_too_thin_stands_for_its_sides(device: Device) -> None:
+    sheet = Object("sheet", shape("cube"), "white", (5, 0, 0), scale=(1, 1e-5, 1))
+    brick = Object("brick", shape("cube"), "white", (0, 1, 0), (0, 20, 0), (1, 0.1, 1))
+    check_tables(arranged(device, scene_of([sheet, brick])), 6, 1)
+
+
+def test_parallelepipeds_stand_in_the_order_of_their_clusters(device: Device) -> None:
+    room = Object("room", shape("cube"), "white", scale=(9, 9, 9))  # whose box is not worth asking
+    bricks = [Object(f"{i}", shape("cube"), "white", (i, 0, 0), (0, 9 * i, 0), (0.3,) * 3) for i in (-2, 2)]
+    tables = arranged(device, scene_of([room, *bricks]))
+    check_tables(tables, 0, 3)
+    assert tables["clusters"]["solid_end"].tolist() == [1, 2, 3]
 
 
 def test_small_bodies_get_boxes_and_walls_do_not(device: Device) -> None:
     walls = [Object("floor", shape("plane"), "white", scale=(4, 1, 4)),
              Object("wall", shape("plane"), "white", (0, 2, -2), (90, 0, 0), (4, 1, 4))]  # fmt: skip
     bodies = [Object(f"{i}", shape("cube"), "white", (i, 0.2, 0), scale=(0.3,) * 3) for i in (-1, 1)]
-    _, clusters = arranged(device, scene_of(walls + bodies))
-    assert clusters["end"].tolist() == [6, 12, 14]
+    table = arranged(device, scene_of(walls + bodies))["clusters"]
+    assert table["solid_end"].tolist() == [1, 2, 2] and table["end"].tolist() == [0, 0, 2]
 
 
 def test_faces_without_area_are_left_out(device: Device) -> None:
     points = np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0]])
     mesh = Mesh(points, [[0, 1, 2], [0, 2, 3], [0, 1, 4]])
-    rows, clusters = arranged(device, scene_of([Object("one", mesh, "white")]))
-    assert len(rows) == 1 and clusters["end"].max() == 1
+    check_tables(arranged(device, scene_of([Object("one", mesh, "white")])), 1, 0)
     nothing = Mesh(points, [[0, 1, 4], [1, 0, 4]])
-    _, clusters = arranged(device, scene_of([Object("none", nothing, "white")]))
-    assert clusters["end"].max() == 0
+    check_tables(arranged(device, scene_of([Object("none", nothing, "white")])), 0, 0)
 
 
 # ---------------------------------------------------------------------------------------------- sweep
@@ -320,6 +414,23 @@ def test_no_ray_slips_through_the_seams_of_parallelograms(device: Device) -> Non
     assert (found[HitPlane.OBJECT].view(np.uint32) == 0).all()
 
 
+def test_rays_along_the_sides_of_a_parallelepiped(device: Device) -> None:
+    """Some components of their directions are 0 in its coordinates, and the rays start inside."""
+    if not traces_in_blocks(device):
+        pytest.skip("no blocks on this device")
+    rng = np.random.default_rng(3)
+    origins = rng.uniform(-0.9, 0.9, (6000, 3))
+    directions = rng.normal(size=(6000, 3)) * (rng.random((6000, 3)) < 0.5)
+    directions[~directions.any(axis=1)] = (0, 1, 0)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    rays = np.ascontiguousarray(np.hstack([origins, directions]).T, np.float32)
+    scene = scene_of([Object("room", shape("cube"), "white", scale=(2, 2, 2))])
+    found, expected = (hits(device, scene, rays, swept) for swept in (True, False))
+    assert (found[HitPlane.OBJECT].view(np.uint32) == 0).all()
+    distances = (planes[HitPlane.DISTANCE] for planes in (found, expected))
+    np.testing.assert_allclose(*distances, rtol=1e-5, atol=1e-6)
+
+
 @pytest.mark.parametrize(
     "placement",
     [
@@ -329,25 +440,30 @@ def test_no_ray_slips_through_the_seams_of_parallelograms(device: Device) -> Non
         {"position": (5, 5, 5), "rotation": (45, 0, 30), "scale": (100, 100, 100)},
     ],
 )
-def test_rays_from_a_parallelogram_never_meet_it_again(device: Device, placement: dict[str, Any]) -> None:
-    """As those from triangles (test_bvh.py): distances in the half ACD are those of the plane through ABC."""
+@pytest.mark.parametrize("name", ["plane", "cube"])
+def test_rays_from_a_side_never_meet_it_again(device: Device, name: str, placement: dict[str, Any]) -> None:
+    """As those from triangles (test_bvh.py): distances in the half ACD are those of the plane through ABC,
+    and those to parallelepipeds come about in another way than the positions that rays start from."""
     if not traces_in_blocks(device):
         pytest.skip("no blocks on this device")
     rng = np.random.default_rng(23)
-    scene = scene_of([Object("one", shape("plane"), "white", **placement)])
+    scene = scene_of([Object("one", shape(name), "white", **placement)])
     matrix = scene.objects[0].world_from_object
-    x, z = rng.uniform(-0.5, 0.5, (2, 20000))
-    targets = transform.apply_affine(matrix, np.stack([x, 0 * x, z], axis=1))
+    local = rng.uniform(-0.5, 0.5, (20000, 3))
+    if name == "plane":
+        local[:, 1] = 0
+    targets = transform.apply_affine(matrix, local)
     origins = targets + rng.normal(size=targets.shape) * rng.choice([0.1, 1, 30], (20000, 1))
 
     def met(starts: npt.NDArray[Any], directions: npt.NDArray[Any]) -> Floats:
         unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
         rays = np.ascontiguousarray(np.hstack([starts, unit]).T, np.float32)
-        planes = hits(device, scene, rays, swept=True)
-        return planes[:, planes[HitPlane.OBJECT].view(np.uint32) != layout.NO_INDEX]
+        return hits(device, scene, rays, swept=True)
 
     first = met(origins, targets - origins)
-    assert len(first.T) > 15000 and len(np.unique(first[HitPlane.TRIANGLE].view(np.uint32))) == 2
+    first = first[:, first[HitPlane.OBJECT].view(np.uint32) != layout.NO_INDEX]
+    assert len(first.T) > 15000
+    assert len(np.unique(first[HitPlane.TRIANGLE].view(np.uint32))) > len(scene.objects[0].mesh.faces) / 2
     position = first[HitPlane.POSITION_X : HitPlane.POSITION_Z + 1].T
     normal = first[HitPlane.GEOMETRIC_X : HitPlane.GEOMETRIC_Z + 1].T
     away = rng.normal(size=normal.shape)
@@ -355,4 +471,9 @@ def test_rays_from_a_parallelogram_never_meet_it_again(device: Device, placement
     up = normal * 10 ** rng.uniform(-7, 1, (len(away), 1))
     for side in (1, -1):
         again = met(position + side * first[HitPlane.OFFSET][:, None] * normal, away + side * up)
-        assert len(again.T) == 0, side
+        hit = again[HitPlane.OBJECT].view(np.uint32) != layout.NO_INDEX
+        if name == "cube" and side == -1:
+            assert hit.mean() > 0.99  # the others have left along an edge
+            same = np.sum(again[HitPlane.GEOMETRIC_X : HitPlane.GEOMETRIC_Z + 1].T * normal, axis=1) > 0.999
+            hit &= same
+        assert not hit.any(), (side, hit.sum())
