@@ -55,11 +55,10 @@ def arrange(parts: Sequence[Part], flat: npt.NDArray[np.bool_]) -> Tables:
         nothing = np.zeros(0, layout.FACET), np.zeros(0, layout.SOLID)
         return Tables(*nothing, np.zeros(1, layout.CLUSTER))
     rows = np.concatenate([_rows(part) for part in parts])
-    solids = np.concatenate([_solids(part) for part in parts])
+    solids, thick = _solids(parts, float(np.abs(rows["vertex"]).max(initial=0.0)))
     groups = np.cumsum(np.concatenate([_starts(part.facets) for part in parts])) - 1
     sides = np.concatenate([np.arange(len(part.facets.faces)) >= part.facets.loose for part in parts])
     # Those of a parallelepiped that is too thin stand for themselves.
-    thick = _thick_enough(solids, rows)
     sides[sides] = np.repeat(thick, SIDES)
     solids = solids[thick]
     kept = ~flat[rows["place"] & ~np.uint32(layout.NODE_PACK)].any(axis=1) | sides
@@ -95,23 +94,18 @@ def _rows(part: Part) -> npt.NDArray[np.void]:
     return rows
 
 
-def _solids(part: Part) -> npt.NDArray[np.void]:
-    corners = part.vertices[part.facets.solids].astype(np.float64)
+def _solids(parts: Sequence[Part], largest: float) -> tuple[npt.NDArray[np.void], npt.NDArray[np.bool_]]:
+    """The parallelepipeds of all parts, and whether the distances of their sides are well above rounding
+    errors; `largest` is the largest coordinate."""
+    corners = np.concatenate([part.vertices[part.facets.solids] for part in parts]).astype(np.float64)
+    axes = corners[:, 1:] - corners[:, :1]
+    regular = np.linalg.det(axes) != 0
+    axes[~regular] = np.eye(3)
+    inverse = np.linalg.inv(axes).transpose(0, 2, 1)
     rows = np.zeros(len(corners), layout.SOLID)
-    edges = corners[:, 1:] - corners[:, :1]
-    with np.errstate(all="ignore"):
-        determinant = np.linalg.det(edges)
-        crosses = np.stack([np.cross(edges[:, (k + 1) % 3], edges[:, (k + 2) % 3]) for k in range(3)], axis=1)
-        rows["local_from_world"] = (crosses / determinant[:, None, None]).reshape(-1, 9)
-    rows["corner"] = corners[:, 0]
-    return rows
-
-
-def _thick_enough(solids: npt.NDArray[np.void], rows: npt.NDArray[np.void]) -> npt.NDArray[np.bool_]:
-    """Whether the distances of opposite sides are well above rounding errors."""
-    steepest = np.linalg.norm(solids["local_from_world"].reshape(-1, 3, 3), axis=2).max(axis=1, initial=0.0)
-    largest = np.abs(rows["vertex"]).max(initial=0.0)
-    return np.asarray(steepest * largest * _LEAST_HEIGHT < 1)
+    rows["corner"], rows["local_from_world"] = corners[:, 0], inverse.reshape(-1, 9)
+    steepest = np.sqrt((inverse**2).sum(axis=2).max(axis=1, initial=0.0))
+    return rows, regular & (steepest * largest * _LEAST_HEIGHT < 1)
 
 
 def _starts(own: Facets) -> npt.NDArray[np.bool_]:
