@@ -4,7 +4,6 @@ each, so that rays pass by those that they cannot meet."""
 from __future__ import annotations
 
 import functools
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,9 +12,13 @@ import numpy.typing as npt
 
 from incpt import layout
 from incpt.facets import SIDES, Facets
+from incpt.scene import Mesh
 
 MOST_CLUSTERS = 32
 """The sweep keeps a bit for each."""
+_MOST_PARTS, _MOST_FACES, _MOST_TESTS, _MOST_COST = 64, 1024, 320, 80
+"""Above one of these a tree is quicker (measured), or the tables would take too long after each edit: objects,
+faces, what it takes to test all facets, and what a group of rays is expected to pay."""
 
 _LEAST_HEIGHT = 2.0**-16
 """Of a parallelepiped, relative to the largest coordinate: below it rounding errors come near to it."""
@@ -27,13 +30,12 @@ _RAYS = 16
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """What one object brings along: its facets, the world-space vertices (V, 3) of its mesh, its index, and
-    the place of each of its faces in the packs (N,), as HIT_TRIANGLE has it."""
+    """What one object brings along: its facets, its index, and where its vertices and its faces begin."""
 
     facets: Facets
-    vertices: npt.NDArray[np.float32]
     index: int
-    places: npt.NDArray[np.uint32]
+    first_vertex: int
+    first_face: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,26 +47,61 @@ class Tables:
     clusters: npt.NDArray[np.void]
 
 
-def arrange(parts: Sequence[Part], flat: npt.NDArray[np.bool_]) -> Tables:
-    """The tables of all parts. `flat` (8 * P,) tells of each place in the packs whether a face without area
-    is there, which no ray meets.
+def empty_tables() -> Tables:
+    """Those of no objects."""
+    return Tables(np.zeros(0, layout.FACET), np.zeros(0, layout.SOLID), np.zeros(1, layout.CLUSTER))
+
+
+def may_be_few(meshes: Sequence[Mesh]) -> bool:
+    """Whether it is worth looking for the facets of these objects' meshes, for `arrange`."""
+    return 0 < len(meshes) <= _MOST_PARTS and sum(len(mesh.faces) for mesh in meshes) <= _MOST_FACES
+
+
+def arrange(
+    parts: Sequence[Part],
+    vertices: npt.NDArray[np.float32],
+    places: npt.NDArray[np.uint32],
+    flat: npt.NDArray[np.bool_],
+) -> Tables | None:
+    """The tables of all parts; None where rays are quicker by the way of a tree.
+
+    vertices  (V, 3) of all parts, in world space.
+    places    (N,) where the faces of all parts stand in the packs, as HIT_TRIANGLE has it.
+    flat      (8 * P,) whether a face without area is in that place of the packs, which no ray meets.
 
     The box of the last cluster is not worth asking: nearly all rays would meet it. It may be empty.
     """
-    if not parts:
-        nothing = np.zeros(0, layout.FACET), np.zeros(0, layout.SOLID)
-        return Tables(*nothing, np.zeros(1, layout.CLUSTER))
-    rows = np.concatenate([_rows(part) for part in parts])
-    solids, thick = _solids(parts, float(np.abs(rows["vertex"]).max(initial=0.0)))
-    groups = np.cumsum(np.concatenate([_starts(part.facets) for part in parts])) - 1
-    sides = np.concatenate([np.arange(len(part.facets.faces)) >= part.facets.loose for part in parts])
-    # Those of a parallelepiped that is too thin stand for themselves.
+    rows, groups, sides = _rows(parts, vertices, places)
+    solids, thick = _solids(parts, vertices)
+    # The sides of a parallelepiped that is too thin stand for themselves.
     sides[sides] = np.repeat(thick, SIDES)
     solids = solids[thick]
     kept = ~flat[rows["place"] & ~np.uint32(layout.NODE_PACK)].any(axis=1) | sides
     rows, sides, group = rows[kept], sides[kept], np.unique(groups[kept], return_inverse=True)[1]
-    clusters, number = _clustered(rows, group, sides)
+    if len(rows) == 0:
+        return empty_tables()
+    if np.count_nonzero(~sides) + _SOLID_COST * len(solids) > _MOST_TESTS:
+        return None
+    boxes = _boxes(rows, group, sides)
+    around = functools.reduce(_Box.joined, boxes).area
+    clusters = _joined(boxes, around)
+    if sum(cluster.cost(around) for cluster in clusters) > _MOST_COST:
+        return None
+    return _tables(rows, solids, sides, group, [cluster for cluster in clusters if cluster.box_pays(around)])
 
+
+def _tables(
+    rows: npt.NDArray[np.void],
+    solids: npt.NDArray[np.void],
+    sides: npt.NDArray[np.bool_],
+    group: npt.NDArray[np.intp],
+    clusters: Sequence[_Box],
+) -> Tables:
+    """Everything in the order of the clusters; what is in none of them is in the last."""
+    number_of_group = np.full(int(group.max()) + 1, len(clusters))
+    for i, cluster in enumerate(clusters):
+        number_of_group[list(cluster.groups)] = i
+    number = number_of_group[group]
     single = rows["place"][:, 0] == rows["place"][:, 1]
     order = np.lexsort([single, number, sides])
     table = np.zeros(len(clusters) + 1, layout.CLUSTER)
@@ -84,20 +121,41 @@ def arrange(parts: Sequence[Part], flat: npt.NDArray[np.bool_]) -> Tables:
     return Tables(rows[order], solids, table)
 
 
-def _rows(part: Part) -> npt.NDArray[np.void]:
-    own = part.facets
-    rows = np.zeros(len(own.faces), layout.FACET)
-    rows["vertex"] = part.vertices[own.corners].reshape(-1, 12)
-    rows["place"] = part.places[own.faces]
-    rows["object"] = part.index
-    rows["turns"] = own.turns[:, 0] | own.turns[:, 1] << np.uint32(2) | own.along << np.uint32(4)
-    return rows
+def _rows(
+    parts: Sequence[Part], vertices: npt.NDArray[np.float32], places: npt.NDArray[np.uint32]
+) -> tuple[npt.NDArray[np.void], npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
+    """All facets, the number of the group that each is in, and whether it is a side of a parallelepiped."""
+    own = [part.facets for part in parts]
+    counts = [len(facets.faces) for facets in own]
+
+    def each(values: list[int]) -> npt.NDArray[np.intp]:
+        return np.repeat(np.array(values, np.intp), counts)
+
+    turns = np.concatenate([facets.turns for facets in own])
+    along = np.concatenate([facets.along for facets in own])
+    rows = np.zeros(sum(counts), layout.FACET)
+    corners = (
+        np.concatenate([facets.corners for facets in own]) + each([p.first_vertex for p in parts])[:, None]
+    )
+    faces = np.concatenate([facets.faces for facets in own]) + each([p.first_face for p in parts])[:, None]
+    rows["vertex"] = vertices[corners].reshape(-1, 12)
+    rows["place"] = places[faces]
+    rows["object"] = each([part.index for part in parts])
+    rows["turns"] = turns[:, 0] | turns[:, 1] << np.uint32(2) | along << np.uint32(4)
+    firsts = np.cumsum([0, *counts[:-1]])
+    starts = np.zeros(len(rows), np.intp)
+    starts[[first + start for facets, first in zip(own, firsts, strict=True) for start in facets.groups]] = 1
+    sides = np.arange(len(rows)) - each(firsts.tolist()) >= each([facets.loose for facets in own])
+    return rows, np.cumsum(starts) - 1, sides
 
 
-def _solids(parts: Sequence[Part], largest: float) -> tuple[npt.NDArray[np.void], npt.NDArray[np.bool_]]:
+def _solids(
+    parts: Sequence[Part], vertices: npt.NDArray[np.float32]
+) -> tuple[npt.NDArray[np.void], npt.NDArray[np.bool_]]:
     """The parallelepipeds of all parts, and whether the distances of their sides are well above rounding
-    errors; `largest` is the largest coordinate."""
-    corners = np.concatenate([part.vertices[part.facets.solids] for part in parts]).astype(np.float64)
+    errors."""
+    corners = vertices[np.concatenate([part.facets.solids + part.first_vertex for part in parts])]
+    corners = corners.astype(np.float64)
     axes = corners[:, 1:] - corners[:, :1]
     regular = np.linalg.det(axes) != 0
     axes[~regular] = np.eye(3)
@@ -105,13 +163,7 @@ def _solids(parts: Sequence[Part], largest: float) -> tuple[npt.NDArray[np.void]
     rows = np.zeros(len(corners), layout.SOLID)
     rows["corner"], rows["local_from_world"] = corners[:, 0], inverse.reshape(-1, 9)
     steepest = np.sqrt((inverse**2).sum(axis=2).max(axis=1, initial=0.0))
-    return rows, regular & (steepest * largest * _LEAST_HEIGHT < 1)
-
-
-def _starts(own: Facets) -> npt.NDArray[np.bool_]:
-    starts = np.zeros(len(own.faces), np.bool_)
-    starts[list(own.groups)] = True
-    return starts
+    return rows, regular & (steepest * np.abs(vertices).max() * _LEAST_HEIGHT < 1)
 
 
 @dataclass(frozen=True)
@@ -164,37 +216,32 @@ def _boxes(
     ]
 
 
-def _clustered(
-    rows: npt.NDArray[np.void], group: npt.NDArray[np.intp], sides: npt.NDArray[np.bool_]
-) -> tuple[list[_Box], npt.NDArray[np.intp]]:
-    """The clusters whose boxes are asked for, and the number of its cluster for each row; one more than there
-    are is that of the rows which rays meet without asking."""
-    if len(rows) == 0:
-        return [], np.zeros(0, np.intp)
-    boxes = _boxes(rows, group, sides)
-    around = functools.reduce(_Box.joined, boxes).area
-    clusters = [cluster for cluster in _joined(boxes, around) if cluster.box_pays(around)]
-    number = np.full(len(boxes), len(clusters))
-    for i, cluster in enumerate(clusters):
-        number[list(cluster.groups)] = i
-    return clusters, number[group]
-
-
 def _joined(boxes: Sequence[_Box], around: float) -> list[_Box]:
-    """Neighbours in the order of the objects become one cluster where that is cheaper, or where there would
-    be too many."""
-    done: list[_Box] = []
-    for box in boxes:
-        last = box
-        while done and done[-1].joined(last).cost(around) <= done[-1].cost(around) + last.cost(around):
-            last = done.pop().joined(last)
-        done.append(last)
-    while len(done) >= MOST_CLUSTERS:
-        both = [a.joined(b) for a, b in itertools.pairwise(done)]
-        more = [
-            joined.cost(around) - a.cost(around) - b.cost(around)
-            for joined, (a, b) in zip(both, itertools.pairwise(done), strict=True)
-        ]
-        i = more.index(min(more))
-        done[i : i + 2] = [both[i]]
-    return done
+    """Neighbours become one cluster where that is cheaper, and where there would be too many."""
+    done = _in_space(boxes)
+    dearer = 0.0
+    while True:
+        boxes, done = done, []
+        for box in boxes:
+            last = box
+            while done and (both := done[-1].joined(last)).cost(around) <= dearer + done[-1].cost(
+                around
+            ) + last.cost(around):
+                done.pop()
+                last = both
+            done.append(last)
+        if len(done) < MOST_CLUSTERS:
+            return done
+        dearer = 2 * dearer + _BOX_COST
+
+
+def _in_space(boxes: Sequence[_Box]) -> list[_Box]:
+    """In the order of a curve that fills space (Morton 1966), so that neighbours are near each other."""
+    centers = np.array([box.least for box in boxes]) + np.array([box.greatest for box in boxes])
+    centers -= centers.min(axis=0)
+    cells = (centers * (1023 / max(float(centers.max()), 1e-30))).astype(np.int64)
+    code = np.zeros(len(boxes), np.int64)
+    for bit in range(10):
+        for axis in range(3):
+            code |= (cells[:, axis] >> bit & 1) << (3 * bit + axis)
+    return [boxes[i] for i in np.argsort(code, kind="stable")]

@@ -22,7 +22,6 @@ from incpt.scene import Change, Mesh, Object, Scene, Vector, diff
 
 _NOT_MOVED = np.eye(3, 4)
 _MOST_FACES_ON_TOP = 512
-_FEW_PACKS = 16
 _MOST_FACES_IN_ALL_ON_TOP = 4096
 """Of one object, and of all, that stand in the top level themselves."""
 
@@ -188,50 +187,49 @@ class DeviceScene:
         objects = self.scene.objects
         others = np.array([i for i in range(len(objects)) if i not in vertices], np.int64)
         bounds = self._objects.bounds[others]
-        triangles = None
-        places: list[npt.NDArray[np.uint32]] = []
-        if vertices:
-            triangles, places = self._triangles_on_top(vertices)
+        triangles, swept = self._triangles_on_top(vertices) if vertices else (None, None)
         self._all_on_top = len(others) == 0
-        self._few_on_top = triangles is not None and len(triangles.packs) <= _FEW_PACKS
+        self._few_on_top = swept is not None
         self._upload("top_nodes", bvh.build_top_with_triangles(self.device, bounds, others, triangles))
         self._upload("top_packs", _joined([triangles.packs] if triangles else [], layout.TRIANGLE_PACK))
-        swept = clusters.arrange([], np.zeros(0, np.bool_))
         self._buffers["block_nodes"] = self._buffers["top_nodes"]
-        if triangles is not None and self._few_on_top:
+        if swept is not None:
             # Blocks of paths meet those triangles without a tree, and take it for the other objects alone.
-            parts = [
-                clusters.Part(self._facets_of(objects[i].mesh), own, i, place)
-                for (i, own), place in zip(vertices.items(), places, strict=True)
-            ]
-            swept = clusters.arrange(parts, np.isnan(triangles.packs["vertex"][:, 0]).ravel())
             self._upload("block_nodes", bvh.build_top_with_triangles(self.device, bounds, others, None))
-        self.cluster_count = len(swept.clusters)
-        self._upload("facets", _joined([swept.facets], layout.FACET))
-        self._upload("solids", _joined([swept.solids], layout.SOLID))
-        self._upload("clusters", swept.clusters)
+        tables = swept if swept is not None else clusters.empty_tables()
+        self.cluster_count = len(tables.clusters)
+        self._upload("facets", _joined([tables.facets], layout.FACET))
+        self._upload("solids", _joined([tables.solids], layout.SOLID))
+        self._upload("clusters", tables.clusters)
 
     def _triangles_on_top(
         self, vertices: dict[int, npt.NDArray[np.float32]]
-    ) -> tuple[bvh.Bvh, list[npt.NDArray[np.uint32]]]:
-        """The tree over the triangles of these objects, whose packs tell object and face; and, for each
-        object, the places of its faces, as HIT_TRIANGLE has it."""
+    ) -> tuple[bvh.Bvh, clusters.Tables | None]:
+        """The tree over the triangles of these objects, whose packs tell object and face, and what blocks of
+        paths are swept over instead, where that is quicker."""
         meshes = [self.scene.objects[i].mesh for i in vertices]
-        firsts = np.cumsum([0, *(len(v) for v in vertices.values())])
-        faces = [mesh.faces + first for mesh, first in zip(meshes, firsts, strict=False)]
-        tree = bvh.build_triangles(
-            self.device, np.concatenate(list(vertices.values())), np.concatenate(faces).astype(np.int32)
-        )
+        first_vertices = np.cumsum([0, *(len(v) for v in vertices.values())]).tolist()
+        first_faces = np.cumsum([0, *(len(mesh.faces) for mesh in meshes)]).tolist()
+        all_vertices = np.concatenate(list(vertices.values()))
+        faces = [mesh.faces + first for mesh, first in zip(meshes, first_vertices, strict=False)]
+        tree = bvh.build_triangles(self.device, all_vertices, np.concatenate(faces).astype(np.int32))
         counts = [len(f) for f in faces]
         owner = np.repeat(np.array(list(vertices), np.uint32), counts)
         own_face = np.concatenate([np.arange(n, dtype=np.uint32) for n in counts])
         face = tree.packs["face"]
         used = face != layout.NO_INDEX
-        place = np.empty(len(own_face), np.uint32)
-        place[face[used]] = np.flatnonzero(used) | layout.NODE_PACK
+        places = np.empty(len(own_face), np.uint32)
+        places[face[used]] = np.flatnonzero(used) | layout.NODE_PACK
         tree.packs["object"][used] = owner[face[used]]
         face[used] = own_face[face[used]]
-        return tree, np.split(place, np.cumsum(counts)[:-1])
+        if not clusters.may_be_few(meshes):
+            return tree, None
+        parts = [
+            clusters.Part(self._facets_of(mesh), *place)
+            for mesh, *place in zip(meshes, vertices, first_vertices, first_faces, strict=False)
+        ]
+        flat = np.isnan(tree.packs["vertex"][:, 0]).ravel()
+        return tree, clusters.arrange(parts, all_vertices, places, flat)
 
     def _facets_of(self, mesh: Mesh) -> facets.Facets:
         if mesh not in self._facets:
