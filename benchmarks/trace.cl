@@ -18,11 +18,11 @@ STAGE void load_rays(const Block *block, __local float *planes, uint path_class,
 
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
 trace_closest(const uint count, __global const float *given, __global const float *limits, BLOCK_PARAMETERS,
-              __global float *distances) {
+              __global float *distances, const uint from_camera) {
     Block block = BLOCK(0, 0);
     const uint first = (uint)get_group_id(0) * BLOCK_PATHS, size = MIN(count - first, BLOCK_PATHS);
     load_rays(&block, block.state.rays, CLASS_LIVE, first, size, count, given);
-    trace_rays(&block, size);
+    trace_rays(&block, size, from_camera != 0);
     for (uint i = 0; i < size; i++) {
         const uint met = load_bits(block.state.hits, HIT_OBJECT * BLOCK_STRIDE + i) != NO_INDEX;
         distances[first + block.results[i]] =

@@ -7,7 +7,7 @@ import time
 import warnings
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import resources
 from typing import Any
@@ -31,12 +31,14 @@ _BUILD_OPTIONS = ["-cl-std=CL1.2", "-cl-mad-enable", "-cl-no-signed-zeros"]
 @dataclass(frozen=True, eq=False)
 class Rays:
     """`origins` and `directions` (N, 3) of unit length, and how far each looks (N,), infinity for as far as
-    there is something. `any_hit`: it is asked whether there is anything, not what is nearest."""
+    there is something. `any_hit`: it is asked whether there is anything, not what is nearest. `from_camera`:
+    neighbours go much the same way."""
 
     origins: Floats
     directions: Floats
     limits: Floats
     any_hit: bool = False
+    from_camera: bool = False
 
     def __len__(self) -> int:
         return len(self.origins)
@@ -87,6 +89,8 @@ class Tracer:
         kernel = self._kernels["trace_any" if placed.rays.any_hit else "trace_closest"]
         arguments = np.uint32(count), placed.planes, placed.limits, *self._arguments, placed.distances
         if self._in_blocks:
+            if not placed.rays.any_hit:
+                arguments = *arguments, np.uint32(placed.rays.from_camera)
             self.device.launch(kernel, -(-count // layout.BLOCK_PATHS), *arguments, work_group=1)
         else:
             self.device.launch(kernel, count, *arguments)
@@ -200,7 +204,7 @@ def camera_rays(camera: Camera, size: tuple[int, int]) -> Rays:
     v = (2 * (y.ravel() + 0.5) / height - 1)[order, None]
     directions = np.asarray(forward) + u * np.asarray(right) - v * np.asarray(up)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    return _rays(np.tile(camera.position, (len(directions), 1)), directions)
+    return replace(_rays(np.tile(camera.position, (len(directions), 1)), directions), from_camera=True)
 
 
 def scattered_rays(first: Rays, distances: Floats, count: int, seed: int) -> Rays:

@@ -134,9 +134,10 @@ INLINE void flight_into_object(Flight *flight, const Geometry *geometry, STATE c
 }
 #endif
 
-// Pushes the children of a node that are met (`near` <= `far`), in its order for the octant.
+// Pushes the children of a node that are met (`near` <= `far`), in its order for the octant. With `any` their
+// distances are not needed: see flight_turn.
 INLINE void flight_push_children(Flight *flight, __global const Node *node, const float8 near,
-                                 const float8 far) {
+                                 const float8 far, const bool any) {
     const uint order = node->order[flight->in.octant];
     uint *references = flight->reference + flight->height;
     float *distances = flight->distance + flight->height;
@@ -149,7 +150,8 @@ INLINE void flight_push_children(Flight *flight, __global const Node *node, cons
     const uchar met =
         __builtin_ia32_cmpps256_mask(sorted, __builtin_ia32_permvarsf256(far, places), 2 /* <= */, 0xff);
     *(UnalignedInt *)references = __builtin_ia32_compresssi256_mask(children, children, met);
-    *(UnalignedFloat *)distances = __builtin_ia32_compresssf256_mask(sorted, sorted, met);
+    if (!any)
+        *(UnalignedFloat *)distances = __builtin_ia32_compresssf256_mask(sorted, sorted, met);
     flight->height += BVH_COUNT_BITS((uint)met);
 #else
     const uint met = bvh_lanes(near <= far);
@@ -166,11 +168,11 @@ INLINE void flight_push_children(Flight *flight, __global const Node *node, cons
 #endif
 }
 
-INLINE void flight_through_node(Flight *flight, uint reference) {
+INLINE void flight_through_node(Flight *flight, uint reference, const bool any) {
     __global const Node *node = flight->in.nodes + reference;
     float8 near, far;
     bvh_box_distances(&flight->in.ray, node, flight->hit.distance, &near, &far);
-    flight_push_children(flight, node, near, far);
+    flight_push_children(flight, node, near, far, any);
 }
 
 // Whether the ray has met a triangle of a pack; it keeps the nearest, unless `any` will do.
@@ -198,16 +200,17 @@ INLINE void flight_look_ahead(const Flight *flight) {
 #endif
 }
 
-// One node or pack more. False when the ray is done: there is nothing left, or, with `any`, something is met.
+// One node or pack more. With `any` the limit stays what it was when a box was met, so that it is not
+// compared again. False when the ray is done: there is nothing left, or, with `any`, something is met.
 INLINE bool flight_turn(Flight *flight, const Geometry *geometry, STATE const float *rays, const bool any) {
     do {
         if (flight->height == 0)
             return false;
         flight->height--;
-    } while (flight->distance[flight->height] > flight->hit.distance);
+    } while (!any && flight->distance[flight->height] > flight->hit.distance);
     const uint reference = flight->reference[flight->height];
     if (!(reference & NODE_LEAF)) {
-        flight_through_node(flight, reference);
+        flight_through_node(flight, reference, any);
         flight_look_ahead(flight);
         return true;
     }

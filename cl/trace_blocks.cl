@@ -18,12 +18,13 @@
 #include "sweep.cl"
 #include "trace.cl"
 
-// Functions of their own: the compiler is quicker with several small ones, and a profiler tells them apart.
-#define STAGE static __attribute__((noinline)) WIDE
-
 #if defined(FEW_ON_TOP) && defined(ALL_ON_TOP)
 #define ALL_SWEPT
 #endif
+#include "packets.cl"
+
+// Functions of their own: the compiler is quicker with several small ones, and a profiler tells them apart.
+#define STAGE static __attribute__((noinline)) WIDE
 
 // Which planes of a path outlive its ray.
 #ifdef MEDIA
@@ -176,17 +177,25 @@ STAGE void prepare_flights(const Block *block, __local const float *rays, uint c
 #endif
 
 // Traces the rays of the live ones of `count` paths; returns how many they are. They come to stand in front.
-STAGE uint trace_rays(Block *block, uint count) {
+// `from_camera` tells whether neighbours go much the same way.
+STAGE uint trace_rays(Block *block, uint count, bool from_camera) {
     Picked kinds[LIVE_KINDS];
     const uint live = gather_live(block, count, kinds);
 #ifdef FEW_ON_TOP
     sweep_nearest(block, live, kinds);
 #endif
 #ifndef ALL_SWEPT
-    prepare_flights(block, block->state.rays, live);
-    for (uint i = 0; i < live; i++)
-        block->list[i] = i;
-    fly_to_nearest(&block->geometry, &block->state, block->spare, block->list, live);
+    uint listed = live;
+#ifdef PACKETS
+    if (from_camera)
+        listed = packets_to_nearest(&block->geometry, &block->state, block->list, live);
+    else
+#endif
+        for (uint i = 0; i < live; i++)
+            block->list[i] = i;
+    if (listed > 0)
+        prepare_flights(block, block->state.rays, live);
+    fly_to_nearest(&block->geometry, &block->state, block->spare, block->list, listed);
 #endif
     return live;
 }
@@ -382,7 +391,7 @@ STAGE void shade_surfaces(const Block *block, uint count) {
 INLINE void trace_block(Block *block, uint first, uint count) {
     start_paths(block, first, count);
     for (uint ray = 0; count > 0; ray++) {
-        count = trace_rays(block, count);
+        count = trace_rays(block, count, ray == 0);
         Ends ends;
         tell_apart(block, count, &ends);
         const float *sky = block->params->environment_color;

@@ -295,7 +295,7 @@ hits_of_rays(const uint count, __global const float *given, BLOCK_PARAMETERS, __
     for (uint i = 0; i < size; i++)
         ((__global uint *)planes)[HIT_OBJECT * count + first + i] = NO_INDEX;
     Ends ends;
-    tell_apart(&block, trace_rays(&block, size), &ends);
+    tell_apart(&block, trace_rays(&block, size, true), &ends);
     const uint hit_count = gather_hits(&block, &ends);
     describe_hits(&block, hit_count);
     for (uint p = 0; p < HIT_PLANES; p++)
