@@ -7,21 +7,20 @@
 // neighbours.
 
 #define BLOCKS
+#if defined(FEW_ON_TOP) && defined(ALL_ON_TOP)
+#define ALL_SWEPT
+#endif
 #include "describe.cl"
 #include "escape.cl"
 #include "flights.cl"
 #include "generate.cl"
 #include "illuminate.cl"
 #include "medium_shade.cl"
+#include "packets.cl"
 #include "pick.cl"
 #include "shade.cl"
 #include "sweep.cl"
 #include "trace.cl"
-
-#if defined(FEW_ON_TOP) && defined(ALL_ON_TOP)
-#define ALL_SWEPT
-#endif
-#include "packets.cl"
 
 // Functions of their own: the compiler is quicker with several small ones, and a profiler tells them apart.
 #define STAGE static __attribute__((noinline)) WIDE

@@ -17,8 +17,8 @@ from incpt.scene import Mesh
 MOST_CLUSTERS = 32
 """The sweep keeps a bit for each."""
 _MOST_PARTS, _MOST_FACES, _MOST_TESTS, _MOST_COST = 64, 1024, 320, 80
-"""Above one of these a tree is quicker (measured), or the tables would take too long after each edit: objects,
-faces, what it takes to test all facets, and what a group of rays is expected to pay."""
+"""Above one of these a tree is quicker (measured), or the tables would take too long after each edit:
+objects, faces, what it takes to test all facets, and what a group of rays is expected to pay."""
 
 _LEAST_HEIGHT = 2.0**-16
 """Of a parallelepiped, relative to the largest coordinate: below it rounding errors come near to it."""
