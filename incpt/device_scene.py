@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import compress, count
+from operator import is_not
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -24,36 +26,72 @@ _NOT_MOVED = np.eye(3, 4)
 _MOST_FACES_ON_TOP = 512
 _MOST_FACES_IN_ALL_ON_TOP = 4096
 """Of one object, and of all, that stand in the top level themselves."""
+_HIDDEN = np.iinfo(np.int64).max
+"""The size of an object that is not seen."""
 
 
 @dataclass(frozen=True, eq=False)
 class _ObjectTable:
     """What the device knows of each object, kept so that an edit of one among thousands describes that one.
 
-    rows     (N,) layout.OBJECT.
-    bounds   (N, 2, 3) in world space.
-    on_top   (N,) whether its triangles are part of the top level.
+    rows      (N,) layout.OBJECT.
+    bounds    (N, 2, 3) in world space.
+    sizes     (N,) faces of those that are seen, else _HIDDEN.
+    vertices  (V, 3) in world space, of the objects whose triangles are part of the top level, smallest first.
+    places    what `rows` was filled in by, beside the objects: see `DeviceScene._build_objects`.
     """
 
     objects: tuple[Object, ...]
     rows: npt.NDArray[np.void]
     bounds: npt.NDArray[np.float64]
-    on_top: npt.NDArray[np.bool_]
+    sizes: npt.NDArray[np.int64]
+    vertices: dict[int, npt.NDArray[np.float32]]
+    places: object = None
 
-    def follow(self, objects: tuple[Object, ...], on_top: Sequence[int]) -> _ObjectTable:
-        """The table of other objects; those that are the same are not described again."""
-        is_on_top = np.zeros(len(objects), np.bool_)
+    def follow(
+        self,
+        objects: tuple[Object, ...],
+        places: object,
+        fill: Callable[[npt.NDArray[np.void], Object], None],
+    ) -> _ObjectTable:
+        """The table of other objects; those that are the same are not described again, and filled in again
+        only for other `places`."""
+        source = self._source(objects)
+        known = np.flatnonzero(source >= 0)
+        sizes = np.empty(len(objects), np.int64)
+        sizes[known] = self.sizes[source[known]]
+        for at in np.flatnonzero(source < 0):
+            obj = objects[at]
+            sizes[at] = len(obj.mesh.faces) if obj.visible else _HIDDEN
+        on_top = _objects_on_top(sizes)
+        vertices = {
+            i: self.vertices[source[i]] if source[i] in self.vertices else _world_vertices(objects[i])
+            for i in on_top
+        }
+        is_on_top, was_on_top = np.zeros(len(objects), np.bool_), np.zeros(len(self.objects), np.bool_)
         is_on_top[on_top] = True
-        known = {id(obj): i for i, obj in enumerate(self.objects)}
-        source = np.array([known.get(id(obj), -1) for obj in objects], np.int64)
-        same = source >= 0
-        same[same] = self.on_top[source[same]] == is_on_top[same]
+        was_on_top[list(self.vertices)] = True
+        same = known[was_on_top[source[known]] == is_on_top[known]]
         rows, bounds = np.zeros(len(objects), layout.OBJECT), np.zeros((len(objects), 2, 3))
         rows[same], bounds[same] = self.rows[source[same]], self.bounds[source[same]]
-        for i in np.flatnonzero(~same):
-            _describe(objects[i], is_on_top[i], rows[i])
+        other: list[int] = _all_but(len(objects), same).tolist()
+        for i in other:
+            _describe(objects[i], vertices.get(i), rows[i])
             bounds[i] = objects[i].world_bounds
-        return _ObjectTable(objects, rows, bounds, is_on_top)
+        for i in other if places == self.places else range(len(objects)):
+            fill(rows[i], objects[i])
+        return _ObjectTable(objects, rows, bounds, sizes, vertices, places)
+
+    def _source(self, objects: tuple[Object, ...]) -> npt.NDArray[np.int64]:
+        """(N,) where each object stood, -1 for those that are new."""
+        if len(objects) == len(self.objects):
+            changed = list(compress(count(), map(is_not, objects, self.objects)))
+            if len(changed) <= 1:  # as in every drag
+                source = np.arange(len(objects))
+                source[changed] = -1
+                return source
+        known = {id(obj): i for i, obj in enumerate(self.objects)}
+        return np.array([known.get(id(obj), -1) for obj in objects], np.int64)
 
 
 class DeviceScene:
@@ -74,9 +112,8 @@ class DeviceScene:
         self._trees: WeakKeyDictionary[Mesh, bvh.Bvh] = WeakKeyDictionary()
         self._facets: WeakKeyDictionary[Mesh, facets.Facets] = WeakKeyDictionary()
         self._places: dict[Mesh, tuple[int, int, int]] = {}
-        self._objects = _ObjectTable(
-            (), np.zeros(0, layout.OBJECT), np.zeros((0, 2, 3)), np.zeros(0, np.bool_)
-        )
+        nothing = np.zeros(0, layout.OBJECT), np.zeros((0, 2, 3)), np.zeros(0, np.int64)
+        self._objects = _ObjectTable((), *nothing, {})
         self._buffers: dict[str, cl.Buffer] = {}
         self._environment: lights.EnvironmentTable | None = None
         self._rebuild(scene, [name for name, _ in _PARTS])
@@ -169,23 +206,20 @@ class DeviceScene:
         self._flat = not normals
 
     def _build_objects(self) -> None:
-        objects = self.scene.objects
-        on_top = _objects_on_top(objects)
-        table = self._objects.follow(objects, on_top)
         index = {name: i for i, name in enumerate(self.scene.materials)}
-        rows = table.rows
-        rows["material"] = [index[obj.material] for obj in objects]
-        if objects:
-            places = np.array([self._places[obj.mesh] for obj in objects], np.uint32)
-            rows["first_node"], rows["first_pack"], rows["first_normal"] = places.T
-        self._upload("objects", rows)
-        self._objects = table
-        self._build_top({i: _world_vertices(objects[i]) for i in on_top})
+        places = self._places
+
+        def fill(row: npt.NDArray[np.void], obj: Object) -> None:
+            row["material"] = index[obj.material]
+            row["first_node"], row["first_pack"], row["first_normal"] = places[obj.mesh]
+
+        self._objects = self._objects.follow(self.scene.objects, (places, tuple(index)), fill)
+        self._upload("objects", self._objects.rows)
+        self._build_top(self._objects.vertices)
 
     def _build_top(self, vertices: dict[int, npt.NDArray[np.float32]]) -> None:
         """The top level; `vertices`: in world space, those of the objects whose triangles are part of it."""
-        objects = self.scene.objects
-        others = np.array([i for i in range(len(objects)) if i not in vertices], np.int64)
+        others = _all_but(len(self.scene.objects), np.array(list(vertices), np.int64))
         bounds = self._objects.bounds[others]
         triangles, swept = self._triangles_on_top(vertices) if vertices else (None, None)
         self._all_on_top = len(others) == 0
@@ -247,9 +281,8 @@ class DeviceScene:
     def _build_lights(self) -> None:
         # Emission of triangles is known before the share of the environment is, which scales the densities.
         environment = self._environment if any(self.scene.environment.radiance) else None
-        has_triangles = any(
-            obj.visible and self.scene.materials[obj.material].is_emissive for obj in self.scene.objects
-        )
+        emissive = {name for name, material in self.scene.materials.items() if material.is_emissive}
+        has_triangles = any(obj.material in emissive and obj.visible for obj in self.scene.objects)
         share = 0.0 if not has_triangles else 0.5 if environment is not None else 1.0
         table = lights.triangle_lights(self.scene, share)
         self.light_count = table.count
@@ -287,19 +320,25 @@ class DeviceScene:
         self._upload("layers", layers)
 
 
-def _describe(obj: Object, on_top: bool, row: npt.NDArray[np.void]) -> None:
-    """Fill a row of the table of objects with what depends on the object alone."""
+def _describe(obj: Object, on_top: npt.NDArray[np.float32] | None, row: npt.NDArray[np.void]) -> None:
+    """Fill a row of the table of objects with what depends on the object alone. `on_top`: its vertices in
+    world space, if its triangles are part of the top level."""
     matrix = obj.world_from_object
     inverse = transform.invert_affine(matrix)
     row["world_from_object"], row["object_from_world"] = matrix.ravel(), inverse.ravel()
-    if on_top:
-        vertices = _world_vertices(obj)
-        bounds = np.stack([vertices.min(axis=0), vertices.max(axis=0)])
+    if on_top is not None:
+        bounds = np.stack([on_top.min(axis=0), on_top.max(axis=0)])
         row["position_error"] = bvh.position_error(bounds, _NOT_MOVED, _NOT_MOVED)
     else:
         row["position_error"] = bvh.position_error(obj.mesh.bounds, matrix, inverse)
     row["visible"] = obj.visible
     row["winding"] = np.sign(np.linalg.det(matrix[:, :3]))
+
+
+def _all_but(count: int, chosen: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    left = np.ones(count, np.bool_)
+    left[chosen] = False
+    return np.flatnonzero(left)
 
 
 def _world_vertices(obj: Object) -> npt.NDArray[np.float32]:
@@ -321,13 +360,13 @@ def _emission_changed(change: Change) -> bool:
                 or change.materials_added_or_removed)  # fmt: skip
 
 
-def _objects_on_top(objects: Sequence[Object]) -> list[int]:
+def _objects_on_top(sizes: npt.NDArray[np.int64]) -> list[int]:
     """The objects whose triangles become part of the top level, smallest first: rays need no way into the
     space of the object then. Only so many that moving one costs milliseconds."""
-    small = [i for i, obj in enumerate(objects) if obj.visible and len(obj.mesh.faces) <= _MOST_FACES_ON_TOP]
-    small.sort(key=lambda i: len(objects[i].mesh.faces))
-    total = np.cumsum([len(objects[i].mesh.faces) for i in small])
-    return small[: int(np.searchsorted(total, _MOST_FACES_IN_ALL_ON_TOP, side="right"))]
+    small = np.flatnonzero(sizes <= _MOST_FACES_ON_TOP)
+    small = small[np.argsort(sizes[small], kind="stable")]
+    fitting = np.searchsorted(np.cumsum(sizes[small]), _MOST_FACES_IN_ALL_ON_TOP, side="right")
+    return [int(i) for i in small[: int(fitting)]]
 
 
 # What is rebuilt, and by which changes; in this order, since lights need the environment and materials

@@ -10,6 +10,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
+from itertools import compress, count
+from operator import is_not
 from types import MappingProxyType
 from typing import Any
 
@@ -346,8 +348,9 @@ class Change:
 
 def diff(old: Scene, new: Scene) -> Change:
     """What changed from `old` to `new`. Unused materials count too: an object may use them next."""
-    before = {o.name: o for o in old.objects}
-    after = {o.name: o for o in new.objects}
+    before, after = (
+        {o.name: o for o in objects} for objects in _without_equal_ends(old.objects, new.objects)
+    )
     common = [name for name in after if name in before and after[name] is not before[name]]
     pairs = [(name, before[name], after[name]) for name in common]
     old_image, new_image = old.environment.image, new.environment.image
@@ -377,6 +380,20 @@ def diff(old: Scene, new: Scene) -> Change:
         ),
         reassigned=frozenset(name for name, a, b in pairs if a.material != b.material),
     )
+
+
+def _without_equal_ends(
+    old: tuple[Object, ...], new: tuple[Object, ...]
+) -> tuple[tuple[Object, ...], tuple[Object, ...]]:
+    """Both without the objects that are the same from the first on and from the last on: nearly all."""
+
+    def same(a: Iterable[Object], b: Iterable[Object], most: int) -> int:
+        return next(compress(count(), map(is_not, a, b)), most)
+
+    most = min(len(old), len(new))
+    first = same(old, new, most)
+    last = min(same(reversed(old), reversed(new), most), most - first)
+    return old[first : len(old) - last], new[first : len(new) - last]
 
 
 def is_deformation(old: Mesh, new: Mesh) -> bool:
