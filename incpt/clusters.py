@@ -16,7 +16,7 @@ from incpt.scene import Mesh
 
 MOST_CLUSTERS = 32
 """The sweep keeps a bit for each."""
-_MOST_PARTS, _MOST_FACES, _MOST_TESTS, _MOST_COST = 64, 1024, 320, 80
+_MOST_PARTS, _MOST_FACES, _MOST_TESTS, _MOST_COST = 128, 1536, 256, 80
 """Above one of these a tree is quicker (measured), or the tables would take too long after each edit:
 objects, faces, what it takes to test all facets, and what a group of rays is expected to pay."""
 
