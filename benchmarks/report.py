@@ -28,7 +28,9 @@ body { font: 15px/1.5 system-ui, sans-serif; max-width: 1100px; margin: 2em auto
 h1, h2 { line-height: 1.2 } h2 { margin-top: 2.5em; border-bottom: 1px solid #ccc }
 table { border-collapse: collapse; margin: 1em 0; font-size: 13px }
 th, td { padding: .25em .7em; border-bottom: 1px solid #ddd; text-align: right } th:first-child,
-td:first-child { text-align: left } figure { display: inline-block; margin: .5em 1em .5em 0 }
+td:first-child { text-align: left; white-space: nowrap }
+figure { display: inline-block; margin: .5em 1em .5em 0 }
+figure svg { width: 33em; height: auto } /* two beside each other */
 svg, img { max-width: 100%; height: auto } .busy { background: #fff3cd; padding: .5em 1em }
 code { font-size: 12px; overflow-wrap: anywhere } .small { color: #555; font-size: 13px }
 """
