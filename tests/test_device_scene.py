@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from incpt import device_scene, layout
 from incpt.device import Device
 from incpt.device_scene import DeviceScene
+from incpt.layout import LightPlane
 from incpt.scene import Camera, Environment, Material, Object, Scene, diff, shape
 
 MATERIALS = {
@@ -70,10 +71,14 @@ def edited(scene: Scene, kind: str, number: int) -> Scene:
 
 
 def contents(device: Device, described: DeviceScene) -> dict[str, npt.NDArray[np.uint8]]:
-    """Every buffer, byte for byte, but those of meshes: their order tells which came first."""
-    lights = ("lights",) if described.light_count else ()
-    names = ("top_packs", "facets", "solids", "clusters", "materials", *lights)
-    return {name: read(device, described, name) for name in names}
+    """Buffers, byte for byte, but those of meshes: their order tells which came first."""
+    names = ("top_packs", "facets", "solids", "clusters", "materials")
+    found = {name: read(device, described, name) for name in names}
+    if described.light_count:  # in whatever order: no object refers to them
+        planes = read(device, described, "lights").view(np.float32).reshape(len(LightPlane), -1)
+        planes = planes[: LightPlane.ALIAS_PROBABILITY]
+        found["lights"] = np.ascontiguousarray(planes[:, np.lexsort(planes)]).view(np.uint8)
+    return found
 
 
 def read(device: Device, described: DeviceScene, name: str) -> npt.NDArray[np.uint8]:
@@ -86,10 +91,17 @@ def objects_of(device: Device, described: DeviceScene) -> npt.NDArray[np.void]:
 
 
 @settings(max_examples=30, deadline=None)
-@given(st.integers(0, 6), EDITS)
+@given(st.integers(0, 6), EDITS, st.sampled_from((20, 4096)))
 def test_after_any_edits_all_is_as_from_a_fresh_start(
-    device: Device, start: int, edits: list[tuple[str, int]]
+    device: Device, start: int, edits: list[tuple[str, int]], most_on_top: int
 ) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        # With few, objects come to the top level and leave it.
+        patch.setattr(device_scene, "_MOST_FACES_IN_ALL_ON_TOP", most_on_top)
+        check_edits(device, start, edits)
+
+
+def check_edits(device: Device, start: int, edits: list[tuple[str, int]]) -> None:
     scene = scene_of(placed(f"{i}", i) for i in range(start))
     described = DeviceScene(device, scene)
     for kind, number in edits:
@@ -105,6 +117,9 @@ def test_after_any_edits_all_is_as_from_a_fresh_start(
     for name in layout.OBJECT.names or ():
         if not name.startswith("first"):  # meshes stand in the order in which they came
             np.testing.assert_array_equal(rows[name], expected_rows[name], err_msg=name)
+    for row, obj in zip(rows, scene.objects, strict=True):
+        firsts = row["first_node"], row["first_pack"], row["first_normal"]
+        assert firsts == described._places[obj.mesh]
 
 
 def test_objects_that_stay_are_not_described_again(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
