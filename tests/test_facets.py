@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from incpt import clusters, facets, layout, transform
+from incpt.benchmarks.scenes import crowd, icosphere
 from incpt.device import Device
 from incpt.device_scene import DeviceScene
 from incpt.layout import HitPlane
@@ -477,3 +478,28 @@ def test_rays_from_a_side_never_meet_it_again(device: Device, name: str, placeme
             same = np.sum(again[HitPlane.GEOMETRIC_X : HitPlane.GEOMETRIC_Z + 1].T * normal, axis=1) > 0.999
             hit &= same
         assert not hit.any(), (side, hit.sum())
+
+
+@pytest.mark.parametrize(
+    ("count", "mesh", "is_swept"),
+    [
+        (40, None, True),
+        (200, None, False),
+        (2, icosphere(1), True),
+        (6, icosphere(1), False),
+        (16, icosphere(0), False),
+    ],
+    ids=["boxes", "many boxes", "balls", "more balls", "small balls"],
+)
+def test_what_is_quicker_by_a_tree_is_not_swept(
+    device: Device, count: int, mesh: Mesh | None, is_swept: bool
+) -> None:
+    variant = DeviceScene(device, crowd(count, mesh)).variant
+    assert "ALL_ON_TOP" in variant and ("FEW_ON_TOP" in variant) == is_swept
+
+
+def test_dear_clusters_are_not_swept(device: Device) -> None:
+    """Few enough facets, but nearly all rays would meet all of them."""
+    nest = Object("nest", soup(100, 3), "white")
+    assert "FEW_ON_TOP" not in DeviceScene(device, scene_of([nest])).variant
+    assert "FEW_ON_TOP" in DeviceScene(device, scene_of([replace(nest, mesh=soup(30, 3))])).variant
