@@ -1,9 +1,11 @@
 #include "bvh.cl"
 #include "lanes.cl"
 
-// Rays against all triangles of a small top level, for blocks of paths. Where a scene has few triangles, the
-// way through a tree is a chain of waiting for memory and of wrongly guessed branches; going over all of them
-// with sixteen rays in the lanes has neither.
+// Rays against everything in a small top level, for blocks of paths. Where a scene has few objects, the way
+// through a tree is a chain of waiting for memory and of wrongly guessed branches; going over all of them
+// with sixteen rays in the lanes has neither. Parallelepipeds are tested as boxes in their own coordinates,
+// what is left as facets, parallelograms and triangles (facets.py); clusters of them have boxes to pass them
+// by.
 //
 // The triangle test is that of bvh.cl. Its axes depend on the largest component of the direction, so that
 // rays are sorted by it; then they are the same for all lanes. A parallelogram is tested as a triangle is, by

@@ -3,8 +3,8 @@
 // that its state never leaves the nearest caches, and no list goes by way of the host. Where a stage is
 // straight-line code, LLVM runs the loop in SIMD lanes.
 //
-// After each ray the paths that hit something move together, so that the loops which follow go over
-// neighbours.
+// Before each ray the paths that live move together, behind it those that hit something, so that the loops
+// which follow go over neighbours.
 
 #define BLOCKS
 #if defined(FEW_ON_TOP) && defined(ALL_ON_TOP)
