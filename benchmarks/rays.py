@@ -72,7 +72,7 @@ class _SceneRays:
     def placed(self, kind: str) -> PlacedRays:
         """The rays of a kind, on the device; their arrays are in them."""
         if not self._placed:
-            first = camera_rays(self._scene.camera, self._plan.size)
+            first = camera_rays(self._scene.camera, self._plan.size, self.tracer.in_squares)
             coherent = self.tracer.place(first)
             distances = coherent.result()
             self._placed = {

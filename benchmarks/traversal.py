@@ -51,11 +51,15 @@ class Rays:
 
 class Tracer:
     """incpt's traversal of a scene with a lamp, as its path tracer does it on that device, or, as `in_blocks`
-    says, as it does it with blocks of paths (on PoCL alone) or with a wavefront."""
+    says, as it does it with blocks of paths (on PoCL alone) or with a wavefront.
+
+    in_squares tells in which order the path tracer takes the pixels of a tile; see `camera_rays`.
+    """
 
     def __init__(self, device: Device, scene: Scene, in_blocks: bool | None = None) -> None:
         self.device = device
         described = DeviceScene(device, scene)
+        self.in_squares = described.has_trees
         self._buffers = described.geometry[:5]
         self._in_blocks = traces_in_blocks(device) if in_blocks is None else in_blocks
         self._arguments = block_arguments(described) if self._in_blocks else self._buffers
@@ -192,16 +196,18 @@ def counting_source(text: str) -> str:
 # ------------------------------------------------------------------------------------------ ray sets
 
 
-def camera_rays(camera: Camera, size: tuple[int, int]) -> Rays:
-    """Through the pixels' centres, tile by tile of 16 x 16: coherent."""
+def camera_rays(camera: Camera, size: tuple[int, int], in_squares: bool = False) -> Rays:
+    """Through the pixels' centres, tile by tile of 16 x 16, and in each row by row or in squares, as
+    cl/tile.cl does it: coherent."""
     width, height = size
     right, up, forward = transform.camera_frame(
         camera.position, camera.target, camera.up, camera.fov_y, width / height
     )
-    y, x = np.mgrid[0:height, 0:width]
-    order = np.lexsort((x.ravel() % 16, y.ravel() % 16, x.ravel() // 16, y.ravel() // 16))
-    u = (2 * (x.ravel() + 0.5) / width - 1)[order, None]
-    v = (2 * (y.ravel() + 0.5) / height - 1)[order, None]
+    y, x = (places.ravel() for places in np.mgrid[0:height, 0:width])
+    edge = 4 if in_squares else 1
+    order = np.lexsort((x % edge, y % edge, x // edge, y // edge, x // 16, y // 16))
+    u = (2 * (x + 0.5) / width - 1)[order, None]
+    v = (2 * (y + 0.5) / height - 1)[order, None]
     directions = np.asarray(forward) + u * np.asarray(right) - v * np.asarray(up)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     return replace(_rays(np.tile(camera.position, (len(directions), 1)), directions), from_camera=True)

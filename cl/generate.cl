@@ -1,16 +1,7 @@
 #include "camera.cl"
 #include "rng.cl"
 #include "state.cl"
-
-// a / b, exactly: the quotient of two 32-bit integers is farther from the next whole number than a double
-// rounds. There are no SIMD instructions that divide integers.
-INLINE uint quotient(uint a, uint b) {
-#ifdef CLANG_CPU
-    return (uint)((double)a / (double)b);
-#else
-    return a / b;
-#endif
-}
+#include "tile.cl"
 
 // Starts a path: the slot, the pixel and the sample index that the plan gives to its place in the path
 // buffer, and its camera ray. Paths of a group of slots go pixel by pixel with the repetitions innermost.
@@ -21,11 +12,10 @@ INLINE void generate_path(const Params *params, __global const Slot *slots, cons
     __global const Slot *slot = &slots[quotient(place, tile_pixels)];
     uint group_count = slot->group_count;
     uint group_place = place - slot->group_first * tile_pixels;
-    uint tile_pixel = quotient(group_place, group_count);
-    uint sample = slot->first_sample + (group_place - tile_pixel * group_count);
-    uint row = quotient(tile_pixel, params->tile_size);
-    uint x = slot->tile_x + (tile_pixel - row * params->tile_size);
-    uint y = slot->tile_y + row;
+    uint pixel_place = quotient(group_place, group_count);
+    uint sample = slot->first_sample + (group_place - pixel_place * group_count);
+    TilePixel at = tile_pixel(params, pixel_place);
+    uint x = slot->tile_x + at.x, y = slot->tile_y + at.y;
     int inside_image = (x < params->width) & (y < params->height);
 
     uint pixel = y * params->width + x;

@@ -1,4 +1,4 @@
-#include "scalar.cl"
+#include "tile.cl"
 
 // Adds up the repetitions of each tile and puts the sums into the film.
 //
@@ -14,14 +14,14 @@ __kernel void reduce(const Params params, const uint group_total, __global const
     if (group >= group_total)
         return;
     __global const Slot *slot = &slots[groups[group]];
-    uint tile_pixel = (uint)get_global_id(0) % tile_pixels;
-    uint x = slot->tile_x + tile_pixel % params.tile_size;
-    uint y = slot->tile_y + tile_pixel / params.tile_size;
+    uint in_tile = (uint)get_global_id(0) % tile_pixels;
+    TilePixel at = {in_tile % params.tile_size, in_tile / params.tile_size};
+    uint x = slot->tile_x + at.x, y = slot->tile_y + at.y;
     if (x >= params.width || y >= params.height)
         return;
 
     uint count = slot->group_count;
-    uint begin = slot->group_first * tile_pixels + tile_pixel * count;
+    uint begin = slot->group_first * tile_pixels + tile_place(&params, at) * count;
     float sum[3] = {0.0f, 0.0f, 0.0f};
     uint bad = 0u;
     for (uint i = begin; i < begin + count; i++) {

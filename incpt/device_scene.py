@@ -147,6 +147,11 @@ class DeviceScene:
         return (*self.features, *(name for name, holds in names.items() if holds))
 
     @property
+    def has_trees(self) -> bool:
+        """Whether rays go through trees, after what is swept."""
+        return not (self._all_on_top and self._few_on_top)
+
+    @property
     def geometry(self) -> tuple[cl.Buffer, ...]:
         """What traversal reads: top nodes and packs, nodes, packs, objects, materials."""
         names = ("top_nodes", "top_packs", "nodes", "packs", "objects", "materials")

@@ -426,6 +426,7 @@ class Session:
         params["camera"] = (camera.position, right, up, forward)
         params["width"], params["height"] = width, height
         params["tile_size"] = settings.tile_size
+        params["in_squares"] = self._device_scene.has_trees
         params["buffer_stride"] = self._buffer_stride
         for name in ("seed", "max_bounces", "transmission_bounces", "roulette_depth"):
             params[name] = getattr(settings, name)

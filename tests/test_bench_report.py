@@ -39,12 +39,14 @@ def tracer(device: Device) -> Tracer:
 
 def test_camera_rays_are_those_of_the_session(tracer: Tracer, device: Device) -> None:
     scene = SCENES["cornell"].scene
-    first = camera_rays(scene.camera, (32, 32))
-    distances = tracer.place(first).result()
     depth = Session(scene, (32, 32), device=device).aovs().depth
     # Tile by tile of 16 x 16.
-    tiles = depth.reshape(2, 16, 2, 16).transpose(0, 2, 1, 3).ravel()
-    np.testing.assert_allclose(distances, tiles, rtol=1e-4)
+    tiles = depth.reshape(2, 16, 2, 16).transpose(0, 2, 1, 3)
+    distances = tracer.place(camera_rays(scene.camera, (32, 32))).result()
+    np.testing.assert_allclose(distances, tiles.ravel(), rtol=1e-4)
+    distances = tracer.place(camera_rays(scene.camera, (32, 32), in_squares=True)).result()
+    squares = tiles.reshape(2, 2, 4, 4, 4, 4).transpose(0, 1, 2, 4, 3, 5)
+    np.testing.assert_allclose(distances, squares.ravel(), rtol=1e-4)
 
 
 def test_shadow_rays_end_at_lamps(tracer: Tracer) -> None:

@@ -1,4 +1,4 @@
-"""Grid, queues and plan: no device needed."""
+"""Grid, queues and plan, which need no device, and the order of the pixels of a tile."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from kernels import call
 
-from incpt.layout import SlotFlag
+from incpt.layout import PARAMS, SlotFlag
 from incpt.tiles import Cursor, Queue, TileGrid, base_queue, is_done, plan, spiral_queue
 
 grids = st.builds(TileGrid, st.integers(1, 120), st.integers(1, 120), st.integers(1, 40))
@@ -216,6 +217,25 @@ def test_refining_counts_on_from_each_tile() -> None:
     step = plan(grid, Queue(base_queue(grid), 2, False), Cursor(), 6, counts)
     assert step.slots["first_sample"].tolist() == [256, 256, 7, 7, 0, 0]
     assert step.slots["flags"].tolist() == [3] * 6
+
+
+@pytest.mark.parametrize("tile_size", [1, 4, 6, 7, 16, 20])
+@pytest.mark.parametrize("in_squares", [False, True])
+def test_pixels_of_a_tile_come_in_squares_or_rows(tile_size: int, in_squares: bool) -> None:
+    count = tile_size**2
+    params = np.zeros(1, PARAMS)
+    params["tile_size"], params["in_squares"] = tile_size, in_squares
+    body = """
+    Params own = params[0];
+    TilePixel at = tile_pixel(&own, i);
+    x[i] = at.x, y[i] = at.y, place[i] = tile_place(&own, at);
+    """
+    x, y, place = call("tile", body, count, ("x", "y", "place"), params=params)
+    rows, columns = np.divmod(np.arange(count), tile_size)
+    edge = 4 if in_squares and tile_size % 4 == 0 else 1
+    order = np.lexsort((columns % edge, rows % edge, columns // edge, rows // edge))
+    assert (x == columns[order]).all() and (y == rows[order]).all()
+    assert (place == np.arange(count)).all()
 
 
 def test_planning_a_4k_image_is_quick() -> None:
