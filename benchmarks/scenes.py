@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import numpy.typing as npt
@@ -160,6 +160,27 @@ SCENES = {
     "sphere": BenchmarkScene(sphere, 327_700, 2, 12, "ball"),
     "plates": BenchmarkScene(plates, 1_332, 2, 12, "plate 2"),
 }
+
+
+def _ball(subdivisions: int) -> Scene:
+    return sphere().with_object("ball", mesh=wavy_sphere(subdivisions))
+
+
+def _land(triangles: int) -> Scene:
+    """Terrain under a sky."""
+    land = Object("terrain", terrain(triangles), "land")
+    sky = Environment(color=(0.8, 0.9, 1.0))
+    return Scene(Camera((0, 1.2, 2.2), (0, 0, 0), fov_y=45), sky, {"land": matt(0.6, 0.6, 0.6)}, (land,))
+
+
+LARGE_SCENES = {
+    "ball-1m": BenchmarkScene(partial(_ball, 8), 1_310_740, 2, 12, "ball"),
+    "ball-5m": BenchmarkScene(partial(_ball, 9), 5_242_900, 2, 12, "ball"),
+    "terrain-100k": BenchmarkScene(partial(_land, 100_000), 100_352, 2, 12, "terrain"),
+    "terrain-1m": BenchmarkScene(partial(_land, 1_000_000), 999_698, 2, 12, "terrain"),
+    "terrain-5m": BenchmarkScene(partial(_land, 5_000_000), 4_999_122, 2, 12, "terrain"),
+}
+"""Meshes of rising size; the ball is that of SCENES."""
 
 
 def triangle_count(scene: Scene) -> int:

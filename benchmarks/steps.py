@@ -1,9 +1,9 @@
 """`incpt bench steps`: what a step costs beside its kernels, and what repeating a tile gains.
 
 The host's share of a step is the part of its wall time in which no kernel runs; the device tells when each
-began and ended. Repetition is measured on whole pictures that the moved object fills: the same tiles, samples
-and paths once pass after pass (BASE and REFINE), once tile after tile with all samples of a pixel together
-(INCREMENTAL). What order alone is worth is measured on the tiles that the spiral reaches first; see
+began and ended. Repetition is measured on whole pictures that the moved object fills, on meshes of rising size
+too: the same tiles, samples and paths once pass after pass (BASE and REFINE), once tile after tile with all
+samples of a pixel together (INCREMENTAL). What order alone is worth is measured on the tiles that the spiral reaches first; see
 `path_order`.
 """
 
@@ -33,7 +33,7 @@ from incpt.benchmarks.path_order import (
     pixel_count,
     spiral_tiles,
 )
-from incpt.benchmarks.scenes import SCENES
+from incpt.benchmarks.scenes import LARGE_SCENES, SCENES
 from incpt.benchmarks.store import Results, Row, Store, grouped
 from incpt.benchmarks.tables import print_table
 from incpt.benchmarks.timing import interleaved, significant, summary
@@ -51,12 +51,13 @@ THESIS_SIZE = (1280, 720)
 FILLS = 0.6
 """Share of the object's bounding sphere that the picture of `close_up` shows."""
 FULL_NOR = 256
+KNOWN = {**SCENES, **LARGE_SCENES}
 
 
 @dataclass(frozen=True)
 class Plan:
     """What is measured: `steps` of each mode, `samples` of each pixel of a picture of `close_size`, and those
-    of the tiles that `spiral_steps` steps after an edit finish."""
+    of the tiles that `spiral_steps` steps after an edit finish; of large scenes the second alone."""
 
     scenes: Sequence[str]
     steps: int = 12
@@ -68,7 +69,7 @@ class Plan:
     def subject(self, name: str, **more: Any) -> Row:
         """That of a measurement of a scene. All of the plan is in it, so that tables keep plans apart."""
         return {
-            "scene": name, "content": digest(SCENES[name].scene), "steps": self.steps,
+            "scene": name, "content": digest(KNOWN[name].scene), "steps": self.steps,
             "close_size": list(self.close_size), "samples": self.samples, "spiral_steps": self.spiral_steps,
             **more,
         }  # fmt: skip
@@ -118,18 +119,19 @@ def tasks(device: ProfiledDevice, plan: Plan) -> list[Task]:
     orders of paths, in turns."""
     made = []
     for name in plan.scenes:
-        for size in (SIZE, THESIS_SIZE):
+        large = name in LARGE_SCENES
+        for size in () if large else (SIZE, THESIS_SIZE):
             for turn in range(plan.repetitions):
                 made.append(_overhead(device, plan, name, size, turn))
         for turn, mode in interleaved((Mode.BASE, Mode.INCREMENTAL), plan.repetitions):
             made.append(_repetition(device, plan, name, mode, turn))
-        for turn, order in interleaved(ORDERS, plan.repetitions):
+        for turn, order in () if large else interleaved(ORDERS, plan.repetitions):
             made.append(_order(device, plan, name, order, turn))
     return made
 
 
 def _settings(name: str, size: tuple[int, int], nor: int = FULL_NOR) -> RenderSettings:
-    bench = SCENES[name]
+    bench = KNOWN[name]
     return RenderSettings(
         size=size, max_bounces=bench.max_bounces, transmission_bounces=bench.transmission_bounces, nor=nor
     )
@@ -186,7 +188,7 @@ def _step(session: Session, device: ProfiledDevice) -> Row:
 
 def _repetition(device: Device, plan: Plan, name: str, mode: Mode, turn: int) -> Task:
     def measure(work: Work) -> Outcome:
-        bench = SCENES[name]
+        bench = KNOWN[name]
         scene = close_up(bench.scene, bench.moves)
         settings = _settings(name, plan.close_size, plan.samples)
         session = Session(scene, settings=settings, device=device)
@@ -331,9 +333,11 @@ def steps(
     device: options.DeviceOption = None,
 ) -> None:
     """A step's cost beside its kernels, steps per second, what repeating a tile gains, and order alone."""
-    plan = Plan(options.chosen("--scene", scene, list(SCENES)))
+    plan = Plan(options.chosen("--scene", scene, list(KNOWN)))
     if quick:
         plan = replace(plan, steps=5, close_size=(160, 90), spiral_steps=2, repetitions=2)
+        # Millions of triangles take long to make.
+        plan = replace(plan, scenes=plan.scenes if scene else [*SCENES, "terrain-1m"])
     plan = replace(plan, samples=samples or plan.samples, repetitions=repetitions or plan.repetitions)
     opened = ProfiledDevice(device)
     store = Store(output, NAME)

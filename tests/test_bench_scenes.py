@@ -34,6 +34,13 @@ def test_scene_has_the_triangles_that_are_said(name: str) -> None:
     bench.scene.object(bench.moves)
 
 
+@pytest.mark.parametrize("name", ["terrain-100k", "ball-1m"])  # the others are made the same way
+def test_large_scene_has_the_triangles_that_are_said(name: str) -> None:
+    bench = scenes.LARGE_SCENES[name]
+    assert scenes.triangle_count(bench.scene) == bench.triangles
+    assert bench.scene is bench.scene
+
+
 def test_larger_scenes() -> None:
     assert len(scenes.terrain(20_000).faces) == 20_000
     crowd = scenes.crowd(30)

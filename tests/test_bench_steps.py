@@ -54,9 +54,9 @@ def test_kernels_of_a_step_fit_into_it() -> None:
     assert device.take_busy_seconds() == 0
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", [*SCENES, "terrain-100k"])
 def test_close_up_shows_the_object_alone(name: str) -> None:
-    bench = SCENES[name]
+    bench = steps.KNOWN[name]
     scene = steps.close_up(bench.scene, bench.moves)
     session = Session(scene, settings=RenderSettings(size=(48, 27)))
     index = [obj.name for obj in scene.objects].index(bench.moves)
@@ -155,6 +155,13 @@ def test_plans_stay_apart() -> None:
     ]
     parts = Results({}, tuple(records)).parts(*EXPERIMENTS[steps.NAME].setup)
     assert len(list(parts)) == 2
+
+
+def test_of_large_scenes_repetition_alone_is_measured() -> None:
+    plan = steps.Plan(["cornell", "terrain-100k"], repetitions=1)
+    measures = {(t.subject["scene"], t.subject["measure"]) for t in steps.tasks(steps.ProfiledDevice(), plan)}
+    every = {("cornell", measure) for measure in (steps.OVERHEAD, steps.REPETITION, steps.ORDER)}
+    assert measures == every | {("terrain-100k", steps.REPETITION)}
 
 
 def test_steps_of_a_small_scene(tmp_path: Path) -> None:
