@@ -1,10 +1,10 @@
 """`incpt bench steps`: what a step costs beside its kernels, and what repeating a tile gains.
 
 The host's share of a step is the part of its wall time in which no kernel runs; the device tells when each
-began and ended. Repetition is measured on whole pictures that the moved object fills, on meshes of rising size
-too: the same tiles, samples and paths once pass after pass (BASE and REFINE), once tile after tile with all
-samples of a pixel together (INCREMENTAL). What order alone is worth is measured on the tiles that the spiral reaches first; see
-`path_order`.
+began and ended. Repetition is measured on whole pictures that an object fills, on meshes of rising size too:
+the same tiles, samples and paths once pass after pass (BASE and REFINE), once tile after tile with all
+samples of a pixel together (INCREMENTAL). What order alone is worth is measured on the tiles that the
+spiral reaches first; see `path_order`.
 """
 
 from __future__ import annotations
@@ -243,7 +243,8 @@ def _order(device: Device, plan: Plan, name: str, order: str, turn: int) -> Task
 
 def tables(results: Results) -> list[Table]:
     """The host's share of steps, what repetition gains, and what the order of paths is worth."""
-    return [_overhead_table(results), _repetition_table(results), _order_table(results)]
+    made = (_overhead_table(results), _repetition_table(results), _order_table(results))
+    return [table for table in made if table.row_count]
 
 
 def overhead(row: Row) -> float:

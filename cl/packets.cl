@@ -1,5 +1,5 @@
 #include "flights.cl"
-#include "sweep.cl"
+#include "lane_triangle.cl"
 
 // Camera rays through the trees, sixteen at a time with one stack, for blocks of paths.
 //
@@ -153,27 +153,21 @@ INLINE void packet_through_pack(Packet *packet, const PacketPlace *place, uint i
     __global const TrianglePack *pack = place->packs + index;
     const uint axes[3] = {bvh_x_axis(rays->main), bvh_y_axis(rays->main), rays->main};
     for (uint lane = 0; lane < BVH_WIDTH && pack->face[lane] != NO_INDEX; lane++) {
-#define PACKET_CORNER(name, corner)                                                                          \
-    const float16 name##z = pack->vertex[3 * corner + axes[2]][lane] - rays->origin[2];                      \
-    const float16 name##x =                                                                                  \
-        (pack->vertex[3 * corner + axes[0]][lane] - rays->origin[0]) - rays->shear[0] * name##z;             \
-    const float16 name##y =                                                                                  \
-        (pack->vertex[3 * corner + axes[1]][lane] - rays->origin[1]) - rays->shear[1] * name##z;
-        PACKET_CORNER(a, 0)
-        PACKET_CORNER(b, 1)
-        PACKET_CORNER(c, 2)
-        const float16 u = SWEEP_EDGE(b, c), v = SWEEP_EDGE(c, a), w = SWEEP_EDGE(a, b);
-        const float16 lowest = BVH_MIN8(BVH_MIN8(u, v), w), highest = BVH_MAX8(BVH_MAX8(u, v), w);
+        LaneCorner corner[3];
+#pragma unroll
+        for (uint i = 0; i < 3; i++)
+            corner[i] = lane_corner(pack->vertex[3 * i + axes[0]][lane], pack->vertex[3 * i + axes[1]][lane],
+                                    pack->vertex[3 * i + axes[2]][lane], rays->origin, rays->shear);
+        const float16 weight[3] = {lane_edge(corner + 1, corner + 2), lane_edge(corner + 2, corner),
+                                   lane_edge(corner, corner + 1)};
+        const float16 lowest = BVH_MIN8(BVH_MIN8(weight[0], weight[1]), weight[2]);
+        const float16 highest = BVH_MAX8(BVH_MAX8(weight[0], weight[1]), weight[2]);
         const int16 inside = (lowest >= 0.0f) | (highest <= 0.0f);
         if (!packet_lanes(inside))
             continue;
-        const float16 determinant = u + v + w, depth = (u * az + v * bz + w * cz) * rays->shear[2];
-        const float16 distance = depth / determinant;
+        const float16 distance = lane_distance(corner, weight, rays->shear[2]);
         const int16 met = inside & (distance > 0.0f) & (distance < packet->limit);
-        packet->limit = met ? distance : packet->limit;
-        packet->weight[0] = met ? u : packet->weight[0];
-        packet->weight[1] = met ? v : packet->weight[1];
-        packet->weight[2] = met ? w : packet->weight[2];
+        lane_keep(met, distance, weight, &packet->limit, packet->weight);
         packet->triangle =
             met ? (uint16)(index * BVH_WIDTH + lane + place->first_triangle) : packet->triangle;
         packet->object =

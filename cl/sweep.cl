@@ -1,5 +1,4 @@
-#include "bvh.cl"
-#include "lanes.cl"
+#include "lane_triangle.cl"
 
 // Rays against everything in a small top level, for blocks of paths. Where a scene has few objects, the way
 // through a tree is a chain of waiting for memory and of wrongly guessed branches; going over all of them
@@ -7,9 +6,9 @@
 // what is left as facets, parallelograms and triangles (facets.py); clusters of them have boxes to pass them
 // by.
 //
-// The triangle test is that of bvh.cl. Its axes depend on the largest component of the direction, so that
-// rays are sorted by it; then they are the same for all lanes. A parallelogram is tested as a triangle is, by
-// the signs of four edges, so that no ray slips through between it and its neighbours.
+// Rays are sorted by the largest component of their direction, so that the axes of the test are the same for
+// all lanes. A parallelogram is tested as a triangle is, by the signs of four edges, so that no ray slips
+// through between it and its neighbours.
 
 // Planes of what the sweep finds.
 #define SWEEP_DISTANCE 0
@@ -36,12 +35,6 @@ INLINE bool sweep_any(const int16 comparison) {
 #endif
 }
 
-// Twice the signed area between the ray and an edge; see bvh_edge.
-INLINE float16 sweep_edge(const float16 ax, const float16 ay, const float16 bx, const float16 by) {
-#pragma OPENCL FP_CONTRACT OFF
-    return ax * by - ay * bx;
-}
-
 // Which rays meet a box between 0 and their limit, to be on the safe side; as bvh_boxes tells it of many
 // boxes and one ray. `inverse` and the shifts are those of bvh_slab, in the axes of the rays.
 INLINE int16 sweep_box(__global const float *bounds, const uint *axes, const float16 *inverse,
@@ -63,45 +56,36 @@ typedef struct {
     uint16 place;
 } SweepGroup;
 
-// Twice the signed area between the ray and an edge, from one corner of a facet to the next.
-#define SWEEP_EDGE(from, to) sweep_edge(to##x, to##y, from##x, from##y)
-
 // Tests the rays against a parallelogram, or a triangle. Of both the weights of the corners A, B and C are
 // kept: in the other half of a parallelogram that of B is negative. With `any`, that something is met is
 // kept.
 INLINE void sweep_facet(SweepGroup *group, __global const Facet *facet, uint index, const uint *axes,
                         const bool triangle, const bool any) {
-    __global const float *vertex = facet->vertex;
-#define SWEEP_CORNER(name, corner)                                                                           \
-    const float16 name##z = vertex[3 * corner + axes[2]] - group->origin[2];                                 \
-    const float16 name##x = (vertex[3 * corner + axes[0]] - group->origin[0]) - group->shear[0] * name##z;   \
-    const float16 name##y = (vertex[3 * corner + axes[1]] - group->origin[1]) - group->shear[1] * name##z;
-    SWEEP_CORNER(a, 0)
-    SWEEP_CORNER(b, 1)
-    SWEEP_CORNER(c, 2)
-    const float16 u = SWEEP_EDGE(b, c), v = SWEEP_EDGE(c, a), w = SWEEP_EDGE(a, b);
-    float16 lowest = BVH_MIN8(u, w), highest = BVH_MAX8(u, w);
+    LaneCorner corner[4];
+#pragma unroll
+    for (uint i = 0; i < (triangle ? 3 : 4); i++) {
+        __global const float *vertex = facet->vertex + 3 * i;
+        corner[i] =
+            lane_corner(vertex[axes[0]], vertex[axes[1]], vertex[axes[2]], group->origin, group->shear);
+    }
+    const float16 weight[3] = {lane_edge(corner + 1, corner + 2), lane_edge(corner + 2, corner),
+                               lane_edge(corner, corner + 1)};
+    float16 lowest = BVH_MIN8(weight[0], weight[2]), highest = BVH_MAX8(weight[0], weight[2]);
     if (triangle) {
-        lowest = BVH_MIN8(lowest, v);
-        highest = BVH_MAX8(highest, v);
+        lowest = BVH_MIN8(lowest, weight[1]);
+        highest = BVH_MAX8(highest, weight[1]);
     } else {
-        SWEEP_CORNER(d, 3)
-        const float16 cd = SWEEP_EDGE(c, d), da = SWEEP_EDGE(d, a);
+        const float16 cd = lane_edge(corner + 2, corner + 3), da = lane_edge(corner + 3, corner);
         lowest = BVH_MIN8(lowest, BVH_MIN8(cd, da));
         highest = BVH_MAX8(highest, BVH_MAX8(cd, da));
     }
-    const float16 determinant = u + v + w, depth = (u * az + v * bz + w * cz) * group->shear[2];
     // Divided before it is compared: what waits for the facet before is the comparison alone. A determinant
     // of 0 fails one of them.
-    const float16 distance = depth / determinant;
+    const float16 distance = lane_distance(corner, weight, group->shear[2]);
     const int16 met = ((lowest >= 0.0f) | (highest <= 0.0f)) & (distance > 0.0f) & (distance < group->limit);
     group->place = met ? (uint16)(index) : group->place;
-    if (any)
-        return;
-    group->limit = met ? distance : group->limit;
-    group->weight[0] = met ? u : group->weight[0];
-    group->weight[1] = met ? v : group->weight[1];
-    group->weight[2] = met ? w : group->weight[2];
+    if (!any)
+        lane_keep(met, distance, weight, &group->limit, group->weight);
 }
 
 // Tests the rays against a parallelepiped, as against a box with slabs (Kay and Kajiya 1986) in its own
@@ -139,10 +123,10 @@ INLINE void sweep_solid(SweepGroup *group, __global const Solid *solid, const ui
         on_second ? (uint16)(base + 2u + (1u << SWEEP_AXIS)) : (uint16)(base + 4u + (2u << SWEEP_AXIS));
     place = on_first ? (uint16)(base) : place;
     group->place = met ? place : group->place;
-    group->limit = met ? distance : group->limit;
 #pragma unroll
     for (uint k = 0; k < 3; k++)
-        group->weight[k] = met ? start[k] + distance * step[k] : group->weight[k];
+        start[k] += distance * step[k];
+    lane_keep(met, distance, start, &group->limit, group->weight);
 }
 
 // The clusters, a bit for each, whose boxes some ray of the group meets, and the last.
