@@ -113,24 +113,27 @@ class Device:
 
     def empty(self, nbytes: int) -> cl.Buffer:
         """An uninitialised buffer, at least 4 bytes. Raises DeviceError where memory runs out."""
-        nbytes = max(int(nbytes), 4)
+        return self._buffer(max(int(nbytes), 4))
+
+    def upload(self, array: npt.NDArray[Any]) -> cl.Buffer:
+        """A new buffer with the bytes of `array`. Raises DeviceError where memory runs out."""
+        if not array.nbytes:
+            return self.empty(0)
+        # Filled as it is made: a command would wait for a thread of the driver to wake up.
+        return self._buffer(array.nbytes, np.ascontiguousarray(array))
+
+    def _buffer(self, nbytes: int, array: npt.NDArray[Any] | None = None) -> cl.Buffer:
         limit = self.cl_device.max_mem_alloc_size
         if nbytes > limit:
             raise DeviceError(
                 f"device memory: one buffer of {nbytes / 2**20:,.0f} MiB is over the "
                 f"{limit / 2**20:,.0f} MiB that {self.name} allows; use a smaller image or scene"
             )
+        flags = cl.mem_flags.READ_WRITE | (0 if array is None else cl.mem_flags.COPY_HOST_PTR)
         try:
-            return cl.Buffer(self.context, cl.mem_flags.READ_WRITE, nbytes)
+            return cl.Buffer(self.context, flags, nbytes if array is None else 0, array)
         except cl.Error as error:
             raise DeviceError(_explain(error, f"a buffer of {nbytes / 2**20:,.1f} MiB")) from error
-
-    def upload(self, array: npt.NDArray[Any]) -> cl.Buffer:
-        """A new buffer with the bytes of `array`."""
-        buffer = self.empty(array.nbytes)
-        if array.nbytes:
-            self.write(buffer, array)
-        return buffer
 
     def write(self, buffer: cl.Buffer, array: npt.NDArray[Any], offset: int = 0) -> None:
         """Copy `array` into `buffer`, `offset` bytes from its start."""
