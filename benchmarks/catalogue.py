@@ -32,7 +32,7 @@ EXPERIMENTS = {
     ),
     sweep.NAME: Experiment(
         "Tile size, NoR, strategy, bounces",
-        lambda results: [sweep.table(results)],
+        sweep.tables,
         ("scene", "size", "base_spp", "reference_spp"),
     ),
     compare.NAME: Experiment("Beside other renderers", compare.tables, ("size", "threads", "reference_spp")),

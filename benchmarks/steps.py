@@ -243,8 +243,8 @@ def _order(device: Device, plan: Plan, name: str, order: str, turn: int) -> Task
 
 def tables(results: Results) -> list[Table]:
     """The host's share of steps, what repetition gains, and what the order of paths is worth."""
-    made = (_overhead_table(results), _repetition_table(results), _order_table(results))
-    return [table for table in made if table.row_count]
+    made = [_overhead_table(results), _repetition_table(results), _order_table(results)]
+    return [table for table in made if table.row_count] or made[:1]
 
 
 def overhead(row: Row) -> float:

@@ -7,10 +7,11 @@ updated tile and until the queue is done.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+import statistics
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 from rich.table import Table
@@ -108,10 +109,93 @@ def _task(bench: EditBench, case: Case, grid: Grid, repetition: int) -> Task:
     return Task(case.label, subject, measure, weight + (case.variant.nor if marks.done else 0))
 
 
-def table(results: Results) -> Table:
-    """Medians over the repetitions; below steps and seconds the normalized RMSE."""
-    shown = Table(title="sweep: medians", title_justify="left", box=None, pad_edge=False)
-    marks = sorted({row["mark"] for r in results.records for row in r.rows}, key=_mark_order)
+class Place(NamedTuple):
+    """What one row of the long table is about."""
+
+    edit: str
+    strategy: str
+    nor: int | None
+    tile_size: int
+    max_bounces: int
+
+
+def tables(results: Results) -> list[Table]:
+    """What NoR is worth, what tile size is worth, and everything."""
+    return [_table_of_nors(results), _table_of_tiles(results), _long_table(results)]
+
+
+def errors(results: Results, mark: str) -> dict[Place, float]:
+    """The median normalized RMSE of each place that has one at a mark."""
+    found = grouped(results, lambda record: error_at(record.rows, mark), *Place._fields)
+    return {Place(*names): statistics.median(values) for names, values in found.items()}
+
+
+def nor_errors(results: Results, mark: str) -> dict[tuple[str, int | None], float]:
+    """Errors at a mark relative to that of restarting with the same edit, tile size and bounces, by strategy
+    and NoR: the geometric mean over what they have in common."""
+    found = errors(results, mark)
+    ratios: dict[tuple[str, int | None], list[float]] = {}
+    for place, error in found.items():
+        restarted = found.get(place._replace(strategy="restart", nor=None))
+        if error > 0 and restarted:
+            ratios.setdefault((place.strategy, place.nor), []).append(error / restarted)
+    return {variant: statistics.geometric_mean(values) for variant, values in ratios.items()}
+
+
+def tile_errors(results: Results, mark: str) -> dict[tuple[int], float]:
+    """Errors at a mark relative to the mean over tile sizes with the same edit, strategy, NoR and bounces, by
+    tile size; means are geometric. The strategy restart is left out, which shows what it has at once."""
+    found = {place: e for place, e in errors(results, mark).items() if place.strategy != "restart" and e > 0}
+    alike: dict[Place, list[float]] = {}
+    for place, error in found.items():
+        alike.setdefault(place._replace(tile_size=0), []).append(error)
+    ratios: dict[tuple[int], list[float]] = {}
+    for place, error in found.items():
+        mean = statistics.geometric_mean(alike[place._replace(tile_size=0)])
+        ratios.setdefault((place.tile_size,), []).append(error / mean)
+    return {size: statistics.geometric_mean(values) for size, values in ratios.items()}
+
+
+def _table_of_nors(results: Results) -> Table:
+    title = "normalized RMSE by NoR, relative to restarting: means over edits and tile sizes"
+    return _relative_table(title, ("strategy", "NoR"), results, nor_errors)
+
+
+def _table_of_tiles(results: Results) -> Table:
+    title = "normalized RMSE by tile size, relative to the mean of all sizes"
+    return _relative_table(title, ("tile",), results, tile_errors)
+
+
+def _relative_table(
+    title: str,
+    names: Sequence[str],
+    results: Results,
+    values: Callable[[Results, str], Mapping[tuple[Any, ...], float]],
+) -> Table:
+    shown = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    marks = [mark for mark in _marks(results) if mark != "done"]
+    for name in (*names, *marks):
+        shown.add_column(name, justify="left" if name == "strategy" else "right", no_wrap=True)
+    columns = [values(results, mark) for mark in marks]
+    rows = dict.fromkeys(key for column in columns for key in column)
+    for key in sorted(rows, key=lambda key: [(part is not None, part) for part in key]):
+        cells = ["" if part is None else str(part) for part in key]
+        shown.add_row(*cells, *(f"{column[key]:.2f}" if key in column else "" for column in columns))
+    return shown
+
+
+def _marks(results: Results) -> list[str]:
+    return sorted({row["mark"] for r in results.records for row in r.rows}, key=_mark_order)
+
+
+def _long_table(results: Results) -> Table:
+    shown = Table(
+        title="medians; below steps and seconds the normalized RMSE",
+        title_justify="left",
+        box=None,
+        pad_edge=False,
+    )
+    marks = _marks(results)
     for name in (
         "edit",
         "strategy",
@@ -125,17 +209,16 @@ def table(results: Results) -> Table:
         *marks,
     ):
         shown.add_column(name, justify="left" if name in ("edit", "strategy") else "right", no_wrap=True)
-    names = ("edit", "strategy", "nor", "tile_size", "max_bounces")
     timings = [
-        grouped(results, lambda r, v=value: r.values.get(v), *names)  # type: ignore[misc]
+        grouped(results, lambda r, v=value: r.values.get(v), *Place._fields)  # type: ignore[misc]
         for value in ("paths_per_second", "first_tile_ms", "step_ms", "queue_s")
     ]
-    at_marks = [grouped(results, lambda r, m=mark: error_at(r.rows, m), *names) for mark in marks]  # type: ignore[misc]
-    for case in timings[0]:
-        cells = ["" if name is None else str(name) for name in case]
-        cells.append(summary([rate / 1e6 for rate in timings[0][case]]).text())
-        cells += [_median(timing.get(case)) for timing in timings[1:]]
-        shown.add_row(*cells, *(_error(errors.get(case)) for errors in at_marks))
+    at_marks = [errors(results, mark) for mark in marks]
+    for place in map(Place._make, timings[0]):
+        cells = ["" if name is None else str(name) for name in place]
+        cells.append(summary([rate / 1e6 for rate in timings[0][place]]).text())
+        cells += [_median(timing.get(place)) for timing in timings[1:]]
+        shown.add_row(*cells, *(f"{found[place]:.4f}" if place in found else "" for found in at_marks))
     return shown
 
 
@@ -151,10 +234,6 @@ def _mark_order(mark: str) -> tuple[int, float]:
 
 def _median(values: Sequence[float] | None) -> str:
     return summary(values).text() if values else ""
-
-
-def _error(values: Sequence[float] | None) -> str:
-    return f"{summary(values).median:.4f}" if values else ""
 
 
 def sweep(
@@ -209,7 +288,7 @@ def sweep(
     gallery = Gallery(output / "references", opened)
     bench = EditBench(opened, gallery, scene, grid.base_spp, grid.reference_spp)
     found = experiment.run(store, tasks(bench, script, settings, grid), environment.describe(opened))
-    print_table(table(found), found, store)
+    print_table(tables(found), found, store)
 
 
 def _seconds(given: Sequence[float] | None, default: Sequence[float]) -> tuple[float, ...]:

@@ -16,7 +16,7 @@ from incpt import cli, scene_io
 from incpt.benchmarks import sweep, table51
 from incpt.benchmarks.edits import EditBench, Marks, edit_subject
 from incpt.benchmarks.pictures import Gallery, flip
-from incpt.benchmarks.store import Results, Store, read
+from incpt.benchmarks.store import Record, Results, Store, read
 from incpt.device import Device
 from incpt.edit_script import Edit, EditScript
 from incpt.metrics import normalized_rmse
@@ -152,6 +152,46 @@ def test_subject_tells_edits_scenes_and_settings_apart(bench: EditBench) -> None
     assert subject(strategy="restart", nor=4) == subject(strategy="restart", nor=16)
     assert subject() != subject(seed=3)
     assert subject() != subject(max_bounces=1)
+
+
+def _found(*errors_of: tuple[str, str, int | None, int, dict[str, float]]) -> Results:
+    """Results of (edit, strategy, NoR, tile size, error at each mark)."""
+    records = []
+    for edit, strategy, nor, tile, errors in errors_of:
+        subject = {"edit": edit, "strategy": strategy, "nor": nor, "tile_size": tile, "max_bounces": 2}
+        rows = tuple({"mark": mark, "normalized_rmse": error} for mark, error in errors.items())
+        records.append(Record("key", subject, "e", "now", {}, {"paths_per_second": 2e6}, rows))
+    return Results({}, tuple(records))
+
+
+def test_sweep_tells_what_nor_and_tile_size_are_worth() -> None:
+    found = _found(
+        ("turn", "restart", None, 8, {"1 steps": 0.2, "1 s": 0.1, "done": 0.01}),
+        ("turn", "restart", None, 16, {"1 steps": 0.2}),
+        ("move", "restart", None, 8, {"1 steps": 0.4}),
+        ("turn", "spiral", 16, 8, {"1 steps": 0.05, "1 s": 0.05}),
+        ("turn", "spiral", 16, 8, {"1 steps": 0.07}),
+        ("turn", "spiral", 16, 8, {"1 steps": 0.04}),
+        ("turn", "spiral", 16, 16, {"1 steps": 0.2}),
+        ("move", "spiral", 16, 8, {"1 steps": 0.4}),
+        ("move", "spiral", 4, 16, {"1 steps": 0.3}),  # nothing to compare it with
+    )
+    nors = sweep.nor_errors(found, "1 steps")
+    # The median of the repetitions is 0.05; (1/4 x 1 x 1)^(1/3).
+    assert nors == pytest.approx({("restart", None): 1, ("spiral", 16): 0.25 ** (1 / 3)})
+    assert sweep.nor_errors(found, "1 s") == pytest.approx({("restart", None): 1, ("spiral", 16): 0.5})
+    # Of turning, 0.05 and 0.2 with mean 0.1; the others have one size each.
+    tiles = sweep.tile_errors(found, "1 steps")
+    assert tiles == pytest.approx({(8,): 0.5**0.5, (16,): 2**0.5})
+    by_nor, by_tile, every = (
+        [list(row) for row in zip(*(c.cells for c in table.columns), strict=True)]
+        for table in sweep.tables(found)
+    )
+    assert by_nor == [["restart", "", "1.00", "1.00"], ["spiral", "16", "0.63", "0.50"]]
+    assert by_tile == [["8", "0.71", "1.00"], ["16", "1.41", ""]]
+    assert every[3] == [
+        "turn", "spiral", "16", "8", "2", "2.00 ±0 %", "", "", "", "0.0500", "0.0500", "",
+    ]  # fmt: skip
 
 
 def test_sweep_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
