@@ -12,7 +12,7 @@ from incpt import device_scene
 from incpt.device import Device
 from incpt.errors import DeviceError, InputError
 from incpt.modes import Mode
-from incpt.scene import Object, Scene, shape
+from incpt.scene import Camera, Environment, Material, Object, Scene, shape
 from incpt.session import Session
 from incpt.tiles import Cursor, Queue, base_queue
 
@@ -92,6 +92,23 @@ def test_order_of_tiles_does_not_matter(device: Device, converged: np.ndarray) -
 @pytest.mark.parametrize("tile_size", [1, 5, 16, 64])
 def test_tile_size_does_not_matter(device: Device, converged: np.ndarray, tile_size: int) -> None:
     assert_same(rendered(device, mixed_scene(tile_size=tile_size, base_nor=8), 64).image(), converged)
+
+
+def test_paths_go_in_squares_where_they_go_through_trees(device: Device) -> None:
+    """As cl/tile.cl has it; seen by what the path buffer holds of a tile of which a lamp fills the left half,
+    with and without a ball that has a tree of its own."""
+    lamp = Object("lamp", shape("plane"), "lamp", (-5, 0, -10), (90, 0, 0), (10, 1, 10))
+    behind = Object("ball", shape("sphere"), "grey", (0, 0, 10))
+    materials = {"lamp": Material(emission=(1, 1, 1)), "grey": Material()}
+    for objects, edge in (((lamp,), 1), ((lamp, behind), 4)):
+        scene = Scene(Camera((0, 0, 0), (0, 0, -1)), Environment(), materials, objects)
+        session = Session(scene, settings=small_settings(size=(8, 8), tile_size=8), device=device)
+        session.step()
+        planes = np.empty((3, session._buffer_stride), np.float32)
+        lit = session.device.read(session._radiance, planes)[0, :64] > 0
+        y, x = np.divmod(np.arange(64), 8)
+        order = np.lexsort((x % edge, y % edge, x // edge, y // edge))
+        assert (lit == (x[order] < 4)).all()
 
 
 def test_chunks_do_not_matter(device: Device, converged: np.ndarray) -> None:
