@@ -67,12 +67,13 @@ def bars(
             high = [s.high - s.median for s in found]
             heights = [s.median for s in found]
             axes.bar(places, heights, width, yerr=[low, high], label=name, error_kw={"elinewidth": 0.8})
-        axes.set_xticks(range(len(groups)), list(groups))
+        tilt = {"rotation": 25, "ha": "right"} if len(groups) > 6 else {}
+        axes.set_xticks(range(len(groups)), list(groups), **tilt)
         if logarithmic:
             axes.set_yscale("log")
         axes.set_ylabel(y_label)
         axes.set_title(title, loc="left")
-        axes.legend(fontsize=7)
+        figure.legend(loc="outside lower center", ncols=max(len(names), 1), fontsize=7)
         return _svg(figure)
 
 

@@ -29,6 +29,7 @@ h1, h2 { line-height: 1.2 } h2 { margin-top: 2.5em; border-bottom: 1px solid #cc
 table { border-collapse: collapse; margin: 1em 0; font-size: 13px }
 th, td { padding: .25em .7em; border-bottom: 1px solid #ddd; text-align: right } th:first-child,
 td:first-child { text-align: left; white-space: nowrap }
+.wide { overflow-x: auto }
 figure { display: inline-block; margin: .5em 1em .5em 0 }
 figure svg { width: 33em; height: auto } /* two beside each other */
 svg, img { max-width: 100%; height: auto } .busy { background: #fff3cd; padding: .5em 1em }
@@ -76,7 +77,7 @@ def html_table(table: Table) -> str:
         "<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>"
         for row in zip(*columns, strict=True)
     ]
-    return f"{title}<table><tr>{head}</tr>{''.join(rows)}</table>"
+    return f'{title}<div class="wide"><table><tr>{head}</tr>{"".join(rows)}</table></div>'
 
 
 def _figure(drawn: str) -> str:
