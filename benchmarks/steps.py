@@ -52,6 +52,7 @@ FILLS = 0.6
 """Share of the object's bounding sphere that the picture of `close_up` shows."""
 FULL_NOR = 256
 KNOWN = {**SCENES, **LARGE_SCENES}
+"""All scenes by name."""
 
 
 @dataclass(frozen=True)

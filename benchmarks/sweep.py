@@ -144,7 +144,7 @@ def nor_errors(results: Results, mark: str) -> dict[tuple[str, int | None], floa
 
 def tile_errors(results: Results, mark: str) -> dict[tuple[int], float]:
     """Errors at a mark relative to the mean over tile sizes with the same edit, strategy, NoR and bounces, by
-    tile size; means are geometric. The strategy restart is left out, which shows what it has at once."""
+    tile size; means are geometric. Restarting is left out: every step of it goes over the whole picture."""
     found = {place: e for place, e in errors(results, mark).items() if place.strategy != "restart" and e > 0}
     alike: dict[Place, list[float]] = {}
     for place, error in found.items():
