@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from rich.table import Table
 
-from incpt.benchmarks import build, latency, rays, scale, steps, sweep, table51
+from incpt.benchmarks.kit.store import Results, Row
+from incpt.benchmarks.measures import build, latency, rays, scale, steps, sweep, table51
 from incpt.benchmarks.peers import compare
-from incpt.benchmarks.store import Results, Row
 
 
 @dataclass(frozen=True)

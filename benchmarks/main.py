@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import typer
 
-from incpt.benchmarks import build, latency, rays, report, scale, screenshots, soak, steps, sweep, table51
+from incpt.benchmarks import report
+from incpt.benchmarks.measures import build, latency, rays, scale, screenshots, soak, steps, sweep, table51
 from incpt.benchmarks.peers import compare
-from incpt.errors import InputError
+from incpt.core.errors import InputError
 
 app = typer.Typer(
     name="incpt bench",

@@ -19,10 +19,10 @@ from pathlib import Path
 
 from rich.table import Table
 
-from incpt import files
-from incpt.benchmarks import store, tables
 from incpt.benchmarks.catalogue import EXPERIMENTS, setup_text
-from incpt.errors import InputError, in_place
+from incpt.benchmarks.kit import store, tables
+from incpt.core import files
+from incpt.core.errors import InputError, in_place
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results"

@@ -14,14 +14,15 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from incpt import files
-from incpt.benchmarks import build, options, plots, rays, scale, steps, store, sweep, table51, tables
 from incpt.benchmarks.catalogue import EXPERIMENTS, setup_text
-from incpt.benchmarks.fit import fitted
+from incpt.benchmarks.kit import options, plots, store, tables
+from incpt.benchmarks.kit.fit import fitted
+from incpt.benchmarks.kit.store import Results, grouped
+from incpt.benchmarks.kit.timing import Summary, summary
+from incpt.benchmarks.measures import build, rays, scale, steps, sweep, table51
 from incpt.benchmarks.peers import compare
-from incpt.benchmarks.store import Results, grouped
-from incpt.benchmarks.timing import Summary, summary
-from incpt.errors import InputError
+from incpt.core import files
+from incpt.core.errors import InputError
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 1100px; margin: 2em auto; padding: 0 1em }

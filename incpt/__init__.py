@@ -11,15 +11,25 @@ image = session.image()  # (H, W, 3) float32 linear radiance
 ```
 """
 
-from incpt.device import Device
-from incpt.errors import DeviceError, InputError, InputWarning, OutputError
-from incpt.image_io import load_image, tone_map, write_exr, write_png
-from incpt.mesh_io import load_mesh
-from incpt.modes import Mode
-from incpt.scene import Camera, Change, Environment, Image, Material, Mesh, Object, Scene, diff, shape
-from incpt.scene_io import load, save
-from incpt.session import Aovs, Session, StepReport
-from incpt.settings import RenderSettings
+from incpt.core.errors import DeviceError, InputError, InputWarning, OutputError
+from incpt.core.settings import RenderSettings
+from incpt.device.device import Device
+from incpt.formats.images import load_image, write_exr, write_png
+from incpt.formats.mesh_files import load_mesh
+from incpt.formats.registry import load
+from incpt.formats.scene_save import save
+from incpt.picture.tone_mapping import tone_map
+from incpt.render.first_hits import Aovs
+from incpt.render.modes import Mode
+from incpt.render.session import Session, StepReport
+from incpt.scene.camera import Camera
+from incpt.scene.change import Change, diff
+from incpt.scene.environment import Environment
+from incpt.scene.image import Image
+from incpt.scene.material import Material
+from incpt.scene.mesh import Mesh
+from incpt.scene.model import Object, Scene
+from incpt.scene.shapes import shape
 
 __all__ = [
     "Aovs",

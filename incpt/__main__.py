@@ -2,6 +2,6 @@
 
 import sys
 
-from incpt.cli import main
+from incpt.cli.main import main
 
 sys.exit(main())

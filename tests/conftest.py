@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import settings
 
-from incpt.device import Device
+from incpt.device.device import Device
 
 # A shared machine stalls now and then; what takes long shows in the durations that pytest prints.
 settings.register_profile("incpt", deadline=None)

@@ -47,11 +47,21 @@ def test_wheel_has_one_package(wheel: list[str]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("folder", "pattern"), [("cl", "*.cl"), ("scenes", "*.toml"), ("incpt", "*.py"), ("incpt", "py.typed")]
+    ("folder", "pattern"),
+    [
+        ("cl", "**/*.cl"),
+        ("scenes", "*.toml"),
+        ("incpt", "**/*.py"),
+        ("ui", "**/*.py"),
+        ("benchmarks", "**/*.py"),
+        ("benchmarks", "**/*.cl"),
+        ("incpt", "py.typed"),
+    ],
 )
 def test_wheel_has_every_file(wheel: list[str], folder: str, pattern: str) -> None:
     prefix = "incpt" if folder == "incpt" else f"incpt/{folder}"
-    expected = {f"{prefix}/{path.name}" for path in (ROOT / folder).glob(pattern)}
+    found = (ROOT / folder).glob(pattern)
+    expected = {f"{prefix}/{path.relative_to(ROOT / folder).as_posix()}" for path in found}
     assert expected
     assert expected <= set(wheel)
 
@@ -63,20 +73,20 @@ def test_wheel_has_what_the_scenes_name(wheel: list[str]) -> None:
 
 
 def test_kernels_and_scenes_are_found_as_resources() -> None:
-    assert any(item.name.endswith(".cl") for item in resources.files("incpt.cl").iterdir())
+    assert (resources.files("incpt.cl") / "path/generate.cl").is_file()
     assert any(item.name.endswith(".toml") for item in resources.files("incpt.scenes").iterdir())
 
 
 def test_importing_incpt_opens_no_window_library() -> None:
-    code = "import sys, incpt, incpt.cli; print(*sys.modules)"
+    code = "import sys, incpt, incpt.cli.main; print(*sys.modules)"
     modules = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
     loaded = {name.split(".")[0] for name in modules.split()} | set(modules.split())
-    assert "incpt.cli" in loaded
+    assert "incpt.cli.main" in loaded
     assert not loaded & (WINDOW | {"incpt.ui", "incpt.benchmarks"})
 
 
 def test_no_module_names_the_window() -> None:
-    for path in (ROOT / "incpt").glob("*.py"):
+    for path in (ROOT / "incpt").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.Import):
                 names = {alias.name for alias in node.names}

@@ -8,17 +8,19 @@ import numpy as np
 import numpy.typing as npt
 from imgui_bundle import imgui, implot
 
-from incpt.errors import OutputError
-from incpt.live import Frame
-from incpt.ui import actions, preferences, recovery
-from incpt.ui.display import Display
-from incpt.ui.document import Document
-from incpt.ui.editor import Editor
-from incpt.ui.overlays import Overlay
-from incpt.ui.renderer import ThreadedRenderer
-from incpt.ui.viewport import Rect, Viewport
+from incpt.core.errors import OutputError
+from incpt.ui import preferences
+from incpt.ui.commands import actions
+from incpt.ui.display.display import Display
+from incpt.ui.display.overlays import Overlay
+from incpt.ui.editor import recovery
+from incpt.ui.editor.document import Document
+from incpt.ui.editor.editor import Editor
+from incpt.ui.viewport.viewport import Rect, Viewport
 from incpt.ui.window import Window
 from incpt.ui.workspace import Workspace
+from incpt.viewer.threaded import ThreadedRenderer
+from incpt.viewer.viewer import Frame
 
 _IDLE_SECONDS = 0.5
 """How long the loop sleeps without an event: messages go away and autosaves are made in between."""

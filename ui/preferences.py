@@ -17,8 +17,8 @@ import platformdirs
 import tomlkit
 import tomlkit.exceptions
 
-from incpt import files
-from incpt.errors import InputError, OutputError, one_line
+from incpt.core import files
+from incpt.core.errors import InputError, OutputError, one_line
 
 CONFIG_DIR = "INCPT_CONFIG_DIR"
 """Environment variable: the folder for everything the editor keeps, in place of the user's own."""

@@ -14,8 +14,8 @@ from imgui_bundle import imgui  # before glfw, whose library it brings
 import glfw  # isort: skip
 import moderngl
 
-from incpt.errors import DeviceError
-from incpt.ui import theme
+from incpt.core.errors import DeviceError
+from incpt.ui.widgets import theme
 
 _GLSL = "#version 330"
 _SETTLING_FRAMES = 3

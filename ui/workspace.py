@@ -7,16 +7,19 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from incpt.device import all_devices, device_name
-from incpt.scene import Object, Scene
-from incpt.ui import actions, dialogs, menus, objects, places, widgets
-from incpt.ui.commands import OVERLAY_NAMES
-from incpt.ui.editor import Editor
+from incpt.device.device import all_devices, device_name
+from incpt.scene import edits
+from incpt.scene.model import Object, Scene
+from incpt.ui.commands import actions, menus
+from incpt.ui.commands.commands import OVERLAY_NAMES
+from incpt.ui.dialogs import dialogs
+from incpt.ui.editor.editor import Editor
 from incpt.ui.panels import display as display_panel
 from incpt.ui.panels import material as material_panel
 from incpt.ui.panels import notices, outliner, plots, render, scene_panel, tool, transform
 from incpt.ui.panels.plots import Records
-from incpt.ui.widgets import Refusals
+from incpt.ui.widgets import places, widgets
+from incpt.ui.widgets.widgets import Refusals
 
 _RIGHT_SHARE, _OUTLINER_SHARE = 0.25, 0.28
 _LEAST_WIDTH = 310.0
@@ -80,7 +83,7 @@ class Workspace:
             editor.select(outcome.selection)
         if outcome.switched is not None:
             is_shown = editor.scene.object(outcome.switched).visible
-            scene = objects.set_visible(editor.scene, (outcome.switched,), not is_shown)
+            scene = edits.set_visible(editor.scene, (outcome.switched,), not is_shown)
             editor.propose(scene, "Hide" if is_shown else "Show")
         if outcome.renaming is not None:
             actions.rename(editor)
@@ -232,13 +235,13 @@ def _with_object(scene: Scene, name: str, new: Object) -> Scene:
 
 def _apply_material_outcome(editor: Editor, material: str, outcome: material_panel.Outcome) -> None:
     if outcome.assign is not None:
-        scene = objects.assign_material(editor.scene, editor.selection.names, outcome.assign)
+        scene = edits.assign_material(editor.scene, editor.selection.names, outcome.assign)
         editor.propose(scene, "Assign material")
     if outcome.is_new:
         actions.new_material(editor)
     if outcome.is_duplicate:
         actions.duplicate_material(editor, material)
     if outcome.is_delete:
-        editor.propose(objects.delete_material(editor.scene, material), "Delete material")
+        editor.propose(edits.delete_material(editor.scene, material), "Delete material")
     if outcome.is_rename:
         actions.rename_material(editor, material)

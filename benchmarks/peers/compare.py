@@ -18,20 +18,20 @@ import numpy.typing as npt
 import typer
 from rich.table import Table
 
-from incpt.benchmarks import environment, experiment, options
-from incpt.benchmarks.content import digest
-from incpt.benchmarks.experiment import Outcome, Task, Work
+from incpt.benchmarks.kit import environment, experiment, options
+from incpt.benchmarks.kit.content import digest
+from incpt.benchmarks.kit.experiment import Outcome, Task, Work
+from incpt.benchmarks.kit.pictures import Gallery, mean_radiance
+from incpt.benchmarks.kit.scenes import SCENES
+from incpt.benchmarks.kit.store import Results, Store, grouped
+from incpt.benchmarks.kit.tables import print_table
+from incpt.benchmarks.kit.timing import interleaved, significant, summary
 from incpt.benchmarks.peers.peer import PEERS, FloatImage, Job, MissingPeer
 from incpt.benchmarks.peers.worker import Worker
-from incpt.benchmarks.pictures import Gallery, mean_radiance
-from incpt.benchmarks.scenes import SCENES
-from incpt.benchmarks.store import Results, Store, grouped
-from incpt.benchmarks.tables import print_table
-from incpt.benchmarks.timing import interleaved, significant, summary
-from incpt.device import Device
-from incpt.errors import InputError
-from incpt.metrics import relative_mse
-from incpt.settings import RenderSettings
+from incpt.core.errors import InputError
+from incpt.core.settings import RenderSettings
+from incpt.device.device import Device
+from incpt.picture.metrics import relative_mse
 
 NAME = "peers"
 MEAN_TOLERANCE = 0.01

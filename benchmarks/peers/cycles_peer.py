@@ -20,9 +20,11 @@ from typing import Any
 import numpy as np
 
 from incpt.benchmarks.peers.peer import FloatImage, Job, MissingPeer
-from incpt.image_io import load_image
-from incpt.layout import MIN_ALPHA
-from incpt.scene import Camera, Material, Vector
+from incpt.core.layout import MIN_ALPHA
+from incpt.core.transform import Vector
+from incpt.formats.images import load_image
+from incpt.scene.camera import Camera
+from incpt.scene.material import Material
 
 _OVERHEAD_SPP = 2
 _ATTEMPTS = 3

@@ -6,10 +6,10 @@ import time
 from dataclasses import replace
 
 from incpt.benchmarks.peers.peer import FloatImage, Job
-from incpt.device import Device
-from incpt.scene import Vector
-from incpt.session import Session
-from incpt.settings import RenderSettings
+from incpt.core.settings import RenderSettings
+from incpt.core.transform import Vector
+from incpt.device.device import Device
+from incpt.render.session import Session
 
 _MOST_SAMPLES_PER_STEP = 16
 _DRAG_NOR = 16

@@ -9,8 +9,11 @@ import mitsuba as mi
 import numpy as np
 import numpy.typing as npt
 
-from incpt.layout import MIN_ALPHA
-from incpt.scene import Camera, Environment, Material, Object, Scene
+from incpt.core.layout import MIN_ALPHA
+from incpt.scene.camera import Camera
+from incpt.scene.environment import Environment
+from incpt.scene.material import Material
+from incpt.scene.model import Object, Scene
 
 
 def scene_dict(

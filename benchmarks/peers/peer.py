@@ -8,7 +8,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from incpt.scene import Scene, Vector
+from incpt.core.transform import Vector
+from incpt.scene.model import Scene
 
 FloatImage = npt.NDArray[np.float32]
 

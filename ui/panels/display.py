@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from incpt.ui import widgets
 from incpt.ui.preferences import DisplaySettings
-from incpt.ui.widgets import Refusals
+from incpt.ui.widgets import widgets
+from incpt.ui.widgets.widgets import Refusals
 
 CURVE_TEXTS = {"agx": "AgX", "filmic": "Filmic", "srgb": "sRGB, clipped"}
 

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
-from incpt.ui import bindings, widgets
+from incpt.ui import bindings
 from incpt.ui.preferences import NAVIGATIONS
+from incpt.ui.widgets import widgets
 
 if TYPE_CHECKING:
-    from incpt.ui.commands import Command
+    from incpt.ui.commands.commands import Command
 
 _NAVIGATION_TEXTS = {"blender": "Blender-like", "plain": "Plain"}
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from incpt.scene import Material
-from incpt.ui import widgets
-from incpt.ui.widgets import Refusals
+from incpt.scene.material import Material
+from incpt.ui.widgets import widgets
+from incpt.ui.widgets.widgets import Refusals
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from incpt.ui import places, theme
-from incpt.ui.editor import Editor
+from incpt.ui.editor.editor import Editor
 from incpt.ui.panels.render import MODE_TEXTS
+from incpt.ui.widgets import places, theme
 
 Rect = tuple[float, float, float, float]
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
-from incpt.scene import Scene
-from incpt.ui import places, theme
-from incpt.ui.selection import Selection
+from incpt.scene.model import Scene
+from incpt.scene.selection import Selection
+from incpt.ui.widgets import places, theme
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from imgui_bundle import imgui, implot
 
-from incpt.live import Frame
-from incpt.ui import places
+from incpt.ui.widgets import places
+from incpt.viewer.viewer import Frame
 
 _MOST_POINTS = 600
 

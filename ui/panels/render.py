@@ -8,11 +8,11 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from incpt.live import Frame, Picture
-from incpt.modes import Mode
-from incpt.settings import STRATEGIES, RenderSettings
-from incpt.ui import places, widgets
-from incpt.ui.widgets import Refusals
+from incpt.core.settings import STRATEGIES, RenderSettings
+from incpt.render.modes import Mode
+from incpt.ui.widgets import places, widgets
+from incpt.ui.widgets.widgets import Refusals
+from incpt.viewer.viewer import Frame, Picture
 
 MODE_TEXTS = {
     Mode.BASE: "Base: the first picture",

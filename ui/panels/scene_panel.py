@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from incpt.scene import Camera, Environment
-from incpt.ui import widgets
-from incpt.ui.widgets import Refusals
+from incpt.scene.camera import Camera
+from incpt.scene.environment import Environment
+from incpt.ui.widgets import widgets
+from incpt.ui.widgets.widgets import Refusals
 
 _Owner = TypeVar("_Owner", Camera, Environment)
 

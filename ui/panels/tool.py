@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from incpt.ui import widgets
-from incpt.ui.editor import Tool
+from incpt.ui.editor.editor import Tool
 from incpt.ui.preferences import RANGES, SnapSettings
-from incpt.ui.widgets import Refusals
+from incpt.ui.widgets import widgets
+from incpt.ui.widgets.widgets import Refusals
 
 OPERATIONS = (("move", "Move"), ("rotate", "Rotate"), ("scale", "Scale"))
 SPACES = (("world", "World axes"), ("local", "The object's axes"))

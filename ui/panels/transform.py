@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from incpt.scene import Object, Vector
-from incpt.ui import widgets
-from incpt.ui.widgets import Refusals
+from incpt.core.transform import Vector
+from incpt.scene.model import Object
+from incpt.ui.widgets import widgets
+from incpt.ui.widgets.widgets import Refusals
 
 
 def draw(obj: Object, is_uniform: bool, refusals: Refusals) -> tuple[Object, bool]:

@@ -1,0 +1,36 @@
+#include "base/scalar.cl"
+
+// SIMD lanes over the paths of a block: loops that the compiler vectorises, and vectors by hand.
+
+// The iterations are independent of each other, in whatever order. LLVM knows it from a note on the function
+// call in the loop, which is lost where an argument is a constant or not used.
+#ifdef __clang__
+#define LANES _Pragma("clang loop vectorize(assume_safety) vectorize_width(16) interleave(disable)")
+#else
+#define LANES
+#endif
+
+// LLVM 14 keeps to registers of 256 bits unless it is told that the code needs wider ones.
+#ifdef __AVX512F__
+#define WIDE __attribute__((min_vector_width(512)))
+#else
+#define WIDE
+#endif
+
+#define LANE_COUNT 16
+
+// Without AVX-512 clang warns that float16 is passed otherwise than with it; nothing is passed to other
+// programs.
+#ifdef __clang__
+#pragma clang diagnostic ignored "-Wpsabi"
+#endif
+
+INLINE float16 load_lanes(__local const float *place) {
+    typedef float16 Unaligned __attribute__((aligned(4)));
+    return *(__local const Unaligned *)place;
+}
+
+INLINE void store_lanes(__local float *place, float16 value) {
+    typedef float16 Unaligned __attribute__((aligned(4)));
+    *(__local Unaligned *)place = value;
+}

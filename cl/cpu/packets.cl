@@ -1,0 +1,298 @@
+#include "cpu/interleaved.cl"
+#include "cpu/lane_triangle.cl"
+
+// Camera rays through the trees, sixteen at a time with one stack, for blocks of paths.
+//
+// Neighbouring paths start through the same pixel or through pixels next to each other, so that their rays
+// meet the same nodes: a packet reads a node once, and tests each of its boxes against all rays in the lanes.
+// Of a pack that many rays look at, triangles are tested one by one in the lanes; where they are few, each
+// ray is tested against its eight triangles as in flights. Rays that have been scattered, and those to points
+// of lamps, part too soon.
+
+#if defined(__AVX512DQ__) && defined(__clang__) && !defined(PORTABLE_LANES)
+#define PACKETS
+#endif
+
+#if defined(PACKETS) && !defined(ALL_SWEPT)
+// A pack is tested in the lanes from so many rays on.
+#define PACKET_MANY 11u
+
+#define PACKET_ABS(v) as_float16(as_int16(v) & INT_MAX)
+
+// The rays in the space of the tree that they are in; see BvhRay. Their directions have the same signs and
+// the same largest component.
+typedef struct {
+    float16 inverse[3], near_shift[3], far_shift[3];
+    float16 origin[3], shear[3]; // along the axes of the triangle test
+    uint octant, main;
+} PacketRays;
+
+typedef struct {
+    __global const Node *nodes;
+    __global const TrianglePack *packs;
+    uint object;         // in whose space they are; NO_INDEX: in the world's
+    uint first_triangle; // of the tree, as HIT_TRIANGLE counts
+} PacketPlace;
+
+typedef struct {
+    PacketRays rays, world;   // where they are, and to come back to
+    float16 limit, weight[3]; // of the nearest hits so far
+    uint16 triangle, object;
+    uint height;
+    uint reference[FLIGHT_STACK_SIZE];
+    float16 near[FLIGHT_STACK_SIZE]; // where each ray enters the box of that reference, infinity: nowhere
+} Packet;
+
+INLINE uint packet_lanes(const int16 comparison) { return (ushort)__builtin_ia32_cvtd2mask512(comparison); }
+
+INLINE void packet_push(Packet *packet, uint reference) {
+    packet->reference[packet->height] = reference;
+    packet->near[packet->height] = 0.0f;
+    packet->height++;
+}
+
+// False where the directions differ in signs or in the largest component.
+INLINE bool packet_prepare(PacketRays *rays, const float16 *origin, const float16 *direction) {
+    const float16 x = PACKET_ABS(direction[0]), y = PACKET_ABS(direction[1]), z = PACKET_ABS(direction[2]);
+    const int16 x_main = (x > y) & (x > z), z_main = ~x_main & ~((y > z) & ~(x > y));
+    const int16 sign[3] = {as_int16(direction[0]) < 0, as_int16(direction[1]) < 0,
+                           as_int16(direction[2]) < 0};
+    const int16 heading =
+        (sign[0] & 1) | (sign[1] & 2) | (sign[2] & 4) | (~(x_main | z_main) & 8) | (z_main & 16);
+    if (packet_lanes(heading != (int16)(heading.s0)))
+        return false;
+    rays->octant = (uint)heading.s0 & 7u;
+    rays->main = (uint)heading.s0 >> 3;
+#pragma unroll
+    for (uint i = 0; i < 3; i++) { // as bvh_slab
+        const int16 zero = PACKET_ABS(direction[i]) < BVH_ZERO;
+        const float16 least =
+            as_float16((as_int16(direction[i]) & INT_MIN) | as_int16((float16)(1.0f / BVH_INVERSE_ZERO)));
+        rays->inverse[i] = 1.0f / (zero ? least : direction[i]);
+        const float16 shift = -origin[i] * rays->inverse[i];
+        const float16 between = zero ? (float16)(BVH_INVERSE_ZERO * 1e-10f) : (float16)(0.0f);
+        const float16 slack = PACKET_ABS(shift) * BVH_SLACK + between;
+        rays->near_shift[i] = shift - slack;
+        rays->far_shift[i] = shift + slack;
+    }
+    const uint axes[3] = {bvh_x_axis(rays->main), bvh_y_axis(rays->main), rays->main};
+    rays->shear[2] = 1.0f / direction[axes[2]];
+    rays->shear[0] = direction[axes[0]] * rays->shear[2];
+    rays->shear[1] = direction[axes[1]] * rays->shear[2];
+#pragma unroll
+    for (uint i = 0; i < 3; i++)
+        rays->origin[i] = origin[axes[i]];
+    return true;
+}
+
+// Pushes the children of a node that any ray meets.
+INLINE void packet_through_node(Packet *packet, const PacketPlace *place, uint reference) {
+    const PacketRays *rays = &packet->rays;
+    __global const Node *node = place->nodes + reference;
+    const uint order = node->order[rays->octant];
+    const uint x = rays->octant & 1u, y = 2u + (rays->octant >> 1 & 1u), z = 4u + (rays->octant >> 2);
+    for (uint i = 0; i < BVH_WIDTH; i++) {
+        const uint lane = order >> (3 * i) & 7u, child = node->child[lane];
+        if (child == NODE_EMPTY)
+            continue;
+        const float16 near_x = node->bounds[x][lane] * rays->inverse[0] + rays->near_shift[0];
+        const float16 near_y = node->bounds[y][lane] * rays->inverse[1] + rays->near_shift[1];
+        const float16 near_z = node->bounds[z][lane] * rays->inverse[2] + rays->near_shift[2];
+        const float16 far_x = node->bounds[x ^ 1u][lane] * rays->inverse[0] + rays->far_shift[0];
+        const float16 far_y = node->bounds[y ^ 1u][lane] * rays->inverse[1] + rays->far_shift[1];
+        const float16 far_z = node->bounds[z ^ 1u][lane] * rays->inverse[2] + rays->far_shift[2];
+        const float16 near_xy = BVH_MAX8(near_x, near_y), near_z0 = BVH_MAX8(near_z, (float16)(0.0f));
+        const float16 far_xy = BVH_MIN8(far_x, far_y), far_z1 = BVH_MIN8(far_z, packet->limit);
+        const float16 near = BVH_MAX8(near_xy, near_z0);
+        const int16 met = near <= BVH_MIN8(far_xy, far_z1) * (1.0f + BVH_SLACK);
+        packet->reference[packet->height] = child;
+        packet->near[packet->height] = met ? near : (float16)(INFINITY);
+        if (packet_lanes(met)) {
+            packet->height++;
+            // One packet is under way at a time: without asking early it would wait for memory each time.
+            if (place->object != NO_INDEX)
+                bvh_prefetch(place->nodes, place->packs, child);
+        }
+    }
+}
+
+// Tests each of the rays in `lanes` against eight triangles at a time.
+INLINE void packet_few_through_pack(Packet *packet, const PacketPlace *place, uint index, uint lanes) {
+    const PacketRays *rays = &packet->rays;
+    __global const TrianglePack *pack = place->packs + index;
+    BvhRay ray;
+    ray.axis[0] = bvh_x_axis(rays->main) * BVH_PLANE_BYTES;
+    ray.axis[1] = bvh_y_axis(rays->main) * BVH_PLANE_BYTES;
+    ray.axis[2] = rays->main * BVH_PLANE_BYTES;
+    for (; lanes; lanes &= lanes - 1) {
+        const uint lane = BVH_FIRST_BIT(lanes);
+#pragma unroll
+        for (uint i = 0; i < 3; i++) {
+            ray.origin[i] = ((const float *)&rays->origin[i])[lane];
+            ray.shear[i] = ((const float *)&rays->shear[i])[lane];
+        }
+        float8 distance, weight[3];
+        BvhHit hit;
+        hit.distance = ((const float *)&packet->limit)[lane];
+        const uint met = bvh_triangles(&ray, pack, hit.distance, &distance, weight);
+        if (!met || !bvh_keep(index, met, distance, weight, &hit))
+            continue;
+        ((float *)&packet->limit)[lane] = hit.distance;
+        ((uint *)&packet->triangle)[lane] = hit.triangle + place->first_triangle;
+        ((uint *)&packet->object)[lane] =
+            place->object != NO_INDEX ? place->object : pack->object[hit.triangle % BVH_WIDTH];
+#pragma unroll
+        for (uint i = 0; i < 3; i++)
+            ((float *)&packet->weight[i])[lane] = hit.weight[i];
+    }
+}
+
+// Tests all rays against one triangle of a pack after the other.
+INLINE void packet_through_pack(Packet *packet, const PacketPlace *place, uint index) {
+    const PacketRays *rays = &packet->rays;
+    __global const TrianglePack *pack = place->packs + index;
+    const uint axes[3] = {bvh_x_axis(rays->main), bvh_y_axis(rays->main), rays->main};
+    for (uint lane = 0; lane < BVH_WIDTH && pack->face[lane] != NO_INDEX; lane++) {
+        LaneCorner corner[3];
+#pragma unroll
+        for (uint i = 0; i < 3; i++)
+            corner[i] = lane_corner(pack->vertex[3 * i + axes[0]][lane], pack->vertex[3 * i + axes[1]][lane],
+                                    pack->vertex[3 * i + axes[2]][lane], rays->origin, rays->shear);
+        const float16 weight[3] = {lane_edge(corner + 1, corner + 2), lane_edge(corner + 2, corner),
+                                   lane_edge(corner, corner + 1)};
+        const float16 lowest = BVH_MIN8(BVH_MIN8(weight[0], weight[1]), weight[2]);
+        const float16 highest = BVH_MAX8(BVH_MAX8(weight[0], weight[1]), weight[2]);
+        const int16 inside = (lowest >= 0.0f) | (highest <= 0.0f);
+        if (!packet_lanes(inside))
+            continue;
+        const float16 distance = lane_distance(corner, weight, rays->shear[2]);
+        const int16 met = inside & (distance > 0.0f) & (distance < packet->limit);
+        lane_keep(met, distance, weight, &packet->limit, packet->weight);
+        packet->triangle =
+            met ? (uint16)(index * BVH_WIDTH + lane + place->first_triangle) : packet->triangle;
+        packet->object =
+            met ? (uint16)(place->object != NO_INDEX ? place->object : pack->object[lane]) : packet->object;
+    }
+}
+
+INLINE PacketPlace packet_world(const Geometry *geometry) {
+    const PacketPlace place = {geometry->top_nodes, geometry->top_packs, NO_INDEX, NODE_PACK};
+    return place;
+}
+
+#ifndef ALL_ON_TOP
+INLINE bool packet_into_object(Packet *packet, PacketPlace *place, const Geometry *geometry,
+                               const float16 *origin, const float16 *direction, uint index) {
+    __global const Object *object = geometry->objects + index;
+    if (!object->visible)
+        return true;
+    __global const float *m = object->object_from_world;
+    float16 p[3], d[3];
+#pragma unroll
+    for (uint i = 0; i < 3; i++) {
+        d[i] = m[4 * i] * direction[0] + m[4 * i + 1] * direction[1] + m[4 * i + 2] * direction[2];
+        p[i] = m[4 * i] * origin[0] + m[4 * i + 1] * origin[1] + m[4 * i + 2] * origin[2] + m[4 * i + 3];
+    }
+    packet->world = packet->rays;
+    place->object = index;
+    place->nodes = geometry->nodes + object->first_node;
+    place->packs = geometry->packs + object->first_pack;
+    place->first_triangle = object->first_pack * BVH_WIDTH;
+    packet_push(packet, FLIGHT_LEAVES);
+    packet_push(packet, 0);
+    return packet_prepare(&packet->rays, p, d);
+}
+#endif
+
+// The nearest hits of the sixteen rays in these planes, before `limit`. False where the rays do not keep
+// together; then nothing is found.
+INLINE bool packet_trace(Packet *packet, const Geometry *geometry, STATE const float *planes) {
+    float16 origin[3], direction[3];
+#pragma unroll
+    for (uint i = 0; i < 3; i++) {
+        origin[i] = load_lanes(planes + i * BLOCK_STRIDE);
+        direction[i] = load_lanes(planes + (3 + i) * BLOCK_STRIDE);
+    }
+    packet->object = NO_INDEX;
+    packet->height = 0;
+    packet_push(packet, 0);
+    PacketPlace place = packet_world(geometry);
+    if (!packet_prepare(&packet->rays, origin, direction))
+        return false;
+    while (packet->height > 0) {
+        packet->height--;
+        const uint lanes = packet_lanes(packet->near[packet->height] <= packet->limit);
+        const uint reference = packet->reference[packet->height];
+#ifndef ALL_ON_TOP
+        if (reference == FLIGHT_LEAVES) {
+            packet->rays = packet->world;
+            place = packet_world(geometry);
+            continue;
+        }
+#endif
+        if (!lanes)
+            continue;
+        if (!(reference & NODE_LEAF)) {
+            packet_through_node(packet, &place, reference);
+            continue;
+        }
+#ifndef ALL_ON_TOP
+        if (place.object == NO_INDEX && !(reference & NODE_PACK)) {
+            if (!packet_into_object(packet, &place, geometry, origin, direction, reference & ~NODE_LEAF))
+                return false;
+            continue;
+        }
+#endif
+        const uint pack = reference & ~(NODE_LEAF | NODE_PACK);
+        if (BVH_COUNT_BITS(lanes) < PACKET_MANY)
+            packet_few_through_pack(packet, &place, pack, lanes);
+        else
+            packet_through_pack(packet, &place, pack);
+    }
+    return true;
+}
+
+INLINE void packet_keep_plane(STATE float *plane, int16 met, float16 value) {
+    store_lanes(plane, met ? value : load_lanes(plane));
+}
+
+// As flight_keep.
+INLINE void packet_keep(const Packet *packet, const State *state, uint path) {
+    STATE float *hits = state->hits + path;
+#ifdef FEW_ON_TOP
+    const int16 met = packet->object != NO_INDEX;
+#else
+    const int16 met = -1;
+#endif
+    packet_keep_plane(hits + HIT_DISTANCE * BLOCK_STRIDE, met, packet->limit);
+    packet_keep_plane(hits + HIT_OBJECT * BLOCK_STRIDE, met, as_float16(packet->object));
+    packet_keep_plane(hits + HIT_TRIANGLE * BLOCK_STRIDE, met, as_float16(packet->triangle));
+#pragma unroll
+    for (uint i = 0; i < 3; i++)
+        packet_keep_plane(hits + (HIT_POSITION_X + i) * BLOCK_STRIDE, met, packet->weight[i]);
+}
+
+// The nearest hits of `count` rays as far as those of sixteen neighbours keep together. The others come to
+// stand in `list`, in order; returns how many they are.
+static __attribute__((noinline)) WIDE uint packets_to_nearest(const Geometry *geometry, const State *state,
+                                                              __local uint *list, uint count) {
+    Packet packet;
+    uint left = 0, first = 0;
+    for (; first + LANE_COUNT <= count; first += LANE_COUNT) {
+#ifdef FEW_ON_TOP
+        packet.limit = load_lanes(state->hits + HIT_DISTANCE * BLOCK_STRIDE + first);
+#else
+        packet.limit = INFINITY;
+#endif
+        if (packet_trace(&packet, geometry, state->rays + first)) {
+            packet_keep(&packet, state, first);
+            continue;
+        }
+        for (uint i = 0; i < LANE_COUNT; i++)
+            list[left++] = first + i;
+    }
+    for (; first < count; first++)
+        list[left++] = first;
+    return left;
+}
+#endif

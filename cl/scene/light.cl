@@ -1,0 +1,182 @@
+#include "shading/material.cl"
+#include "base/rng.cl"
+
+// Emitters: triangles, and the environment. Which exist is known when a kernel is built
+// (ENVIRONMENT_IMAGE, TRIANGLE_LIGHTS), so that a scene does not pay for what it has not.
+// A constant environment is left to BSDF sampling, which finds it without any variance of its own.
+
+#if defined(ENVIRONMENT_IMAGE) || defined(TRIANGLE_LIGHTS)
+#define LIGHT_SAMPLING
+#endif
+
+typedef struct {
+    __global const Material *materials;
+    __global const float *lights;      // planes of params.light_count triangles
+    __global const float *image;       // environment, red, green, blue, row by row from +y
+    __global const float *marginal;    // cumulative distribution of rows, height + 1
+    __global const float *conditional; // of the pixels of each row, width + 1 each
+    __global const float *texel_pdf;   // density over the unit square of the image, per texel
+} Emitters;
+
+typedef struct {
+    Vec3 direction;
+    float distance;
+    Vec3 radiance; // arriving, nothing in the way
+    float pdf;     // per solid angle; 0 where the sample failed
+} LightSample;
+
+// Place in the lat-long image, in [0, 1) x [0, 1], of a direction. OpenEXR: the centre looks to +z, three
+// quarters to the right is -x, the top row is +y; the rotation turns the image right-handed about +y.
+INLINE Uniform2 environment_place(const Params *params, Vec3 direction) {
+    Uniform2 place;
+    float u = 0.5f + atan2_turns(-direction.x, direction.z) + params->environment_rotation;
+    place.u = u - FLOOR(u);
+    place.v = 2.0f * atan2_turns(SQRT(direction.x * direction.x + direction.z * direction.z), direction.y);
+    return place;
+}
+
+INLINE Vec3 environment_direction(const Params *params, Uniform2 place) {
+    float longitude = place.u - 0.5f - params->environment_rotation;
+    float sine, cosine, sin_polar, cos_polar;
+    sincos_turns(longitude - FLOOR(longitude), &sine, &cosine);
+    sincos_turns(0.5f * place.v, &sin_polar, &cos_polar);
+    return vec3(-sin_polar * sine, cos_polar, sin_polar * cosine);
+}
+
+// Radiance of the image at a place, bilinear between texel centres; columns wrap round, rows end.
+INLINE Vec3 image_radiance(const Params *params, const Emitters *emitters, Uniform2 place) {
+    uint width = params->environment_width, height = params->environment_height;
+    float x = place.u * (float)width - 0.5f;
+    float y = CLAMP(place.v * (float)height - 0.5f, 0.0f, (float)(height - 1u));
+    float column = FLOOR(x), row = FLOOR(y);
+    float tx = x - column, ty = y - row;
+    int x0 = (int)column;
+    uint left = (uint)(x0 < 0 ? x0 + (int)width : x0);
+    uint right = (uint)(x0 + 1 >= (int)width ? x0 + 1 - (int)width : x0 + 1);
+    uint top = (uint)row;
+    uint bottom = MIN(top + 1u, height - 1u);
+    __global const float *p00 = emitters->image + 3u * (top * width + left);
+    __global const float *p10 = emitters->image + 3u * (top * width + right);
+    __global const float *p01 = emitters->image + 3u * (bottom * width + left);
+    __global const float *p11 = emitters->image + 3u * (bottom * width + right);
+    return vec3(LERP(LERP(p00[0], p10[0], tx), LERP(p01[0], p11[0], tx), ty),
+                LERP(LERP(p00[1], p10[1], tx), LERP(p01[1], p11[1], tx), ty),
+                LERP(LERP(p00[2], p10[2], tx), LERP(p01[2], p11[2], tx), ty));
+}
+
+INLINE float environment_pdf(const Params *params, const Emitters *emitters, Uniform2 place) {
+    uint width = params->environment_width, height = params->environment_height;
+    uint column = MIN((uint)(place.u * (float)width), width - 1u);
+    uint row = MIN((uint)(place.v * (float)height), height - 1u);
+    float sin_polar, cos_polar;
+    sincos_turns(0.5f * place.v, &sin_polar, &cos_polar);
+    // The unit square has 2 pi^2 sin(polar) of solid angle per area.
+    return emitters->texel_pdf[row * width + column] / (2.0f * PI * PI * MAX(sin_polar, 1e-6f)) *
+           params->environment_probability;
+}
+
+// Radiance that arrives from far away along -direction, and the density with which light sampling would
+// have chosen the direction (0: never).
+INLINE Vec3 eval_environment(const Params *params, const Emitters *emitters, Vec3 direction, float *pdf) {
+    Vec3 color =
+        vec3(params->environment_color[0], params->environment_color[1], params->environment_color[2]);
+#ifdef ENVIRONMENT_IMAGE
+    Uniform2 place = environment_place(params, direction);
+    *pdf = environment_pdf(params, emitters, place);
+    return times(color, image_radiance(params, emitters, place));
+#else
+    *pdf = 0.0f;
+    return color;
+#endif
+}
+
+#ifdef ENVIRONMENT_IMAGE
+INLINE LightSample sample_environment(const Params *params, const Emitters *emitters, Uniform2 uv) {
+    uint width = params->environment_width, height = params->environment_height;
+    uint row = find_cell(emitters->marginal, height, uv.v);
+    float low = emitters->marginal[row], high = emitters->marginal[row + 1u];
+    __global const float *cells = emitters->conditional + row * (width + 1u);
+    uint column = find_cell(cells, width, uv.u);
+    float left = cells[column], right = cells[column + 1u];
+    Uniform2 place;
+    place.v = ((float)row + (uv.v - low) / MAX(high - low, 1e-30f)) / (float)height;
+    place.u = ((float)column + (uv.u - left) / MAX(right - left, 1e-30f)) / (float)width;
+    LightSample result;
+    result.direction = environment_direction(params, place);
+    result.distance = INFINITY;
+    // By way of the direction, as a ray that finds it does: both techniques then agree on the texel.
+    result.radiance = eval_environment(params, emitters, result.direction, &result.pdf);
+    return result;
+}
+#endif
+
+#ifdef TRIANGLE_LIGHTS
+INLINE Vec3 light_vec3(__global const float *plane, uint stride, uint i) {
+    return vec3(plane[i], plane[stride + i], plane[2 * stride + i]);
+}
+
+// `choice` picks the triangle (Walker's alias method), `uv` the point on it.
+INLINE LightSample sample_triangle_light(const Params *params, const Emitters *emitters, Vec3 position,
+                                         Uniform2 uv, float choice) {
+    uint stride = params->light_count;
+    __global const float *lights = emitters->lights;
+    float scaled_choice = choice * (float)stride;
+    uint cell = MIN((uint)scaled_choice, stride - 1u);
+    uint alias = ((__global const uint *)lights)[LIGHT_ALIAS * stride + cell];
+    uint light = scaled_choice - (float)cell < lights[LIGHT_ALIAS_PROBABILITY * stride + cell] ? cell : alias;
+    float b1, b2;
+    sample_triangle(uv.u, uv.v, &b1, &b2);
+    Vec3 vertex = light_vec3(lights + LIGHT_VERTEX_X * stride, stride, light);
+    Vec3 edge_1 = light_vec3(lights + LIGHT_EDGE_1_X * stride, stride, light);
+    Vec3 edge_2 = light_vec3(lights + LIGHT_EDGE_2_X * stride, stride, light);
+    Vec3 point = add(vertex, add(scaled(b1, edge_1), scaled(b2, edge_2)));
+    Vec3 normal = unit(outer(edge_1, edge_2));
+    Vec3 to_light = subtract(point, position);
+    float squared = inner(to_light, to_light);
+    LightSample result;
+    result.distance = SQRT(squared);
+    result.direction = scaled(1.0f / MAX(result.distance, 1e-30f), to_light);
+    float cosine = -inner(normal, result.direction);
+    int double_sided = ((__global const uint *)lights)[LIGHT_DOUBLE_SIDED * stride + light] != 0u;
+    int shines = double_sided | (cosine > 0.0f);
+    float facing = FABS(cosine);
+    int valid = shines & (facing > 1e-7f) & (squared > 0.0f);
+    result.radiance = light_vec3(lights + LIGHT_EMISSION_R * stride, stride, light);
+    result.pdf = valid ? lights[LIGHT_PDF_AREA * stride + light] * squared / (valid ? facing : 1.0f) : 0.0f;
+    return result;
+}
+#endif
+
+#ifdef LIGHT_SAMPLING
+// One direction towards a light, chosen by power among triangles and the environment.
+INLINE LightSample sample_light(const Params *params, const Emitters *emitters, Vec3 position, Uniform2 uv,
+                                float choice) {
+#if defined(ENVIRONMENT_IMAGE) && defined(TRIANGLE_LIGHTS)
+    float p = params->environment_probability;
+    int far = choice < p;
+    LightSample a = sample_environment(params, emitters, uv);
+    LightSample b = sample_triangle_light(params, emitters, position, uv,
+                                          MIN(MAX(choice - p, 0.0f) / (1.0f - p), 0.99999994f));
+    LightSample result;
+    result.direction = choose(far, a.direction, b.direction);
+    result.distance = far ? a.distance : b.distance;
+    result.radiance = choose(far, a.radiance, b.radiance);
+    result.pdf = far ? a.pdf : b.pdf;
+    return result;
+#elif defined(ENVIRONMENT_IMAGE)
+    return sample_environment(params, emitters, uv);
+#elif defined(TRIANGLE_LIGHTS)
+    return sample_triangle_light(params, emitters, position, uv, choice);
+#endif
+}
+#endif
+
+// Radiance that a hit surface emits towards the ray's origin, weighted against light sampling, which would
+// have found the point with the material's area density. bsdf_pdf 0: nobody else could have found it.
+INLINE Vec3 emitted_radiance(__global const Material *material, float facing, float distance,
+                             float bsdf_pdf) {
+    int shines = ((material->flags & MATERIAL_DOUBLE_SIDED) != 0u) | (facing > 0.0f);
+    float light_pdf = material->light_pdf * distance * distance / MAX(FABS(facing), 1e-7f);
+    float weight = bsdf_pdf > 0.0f ? mis_weight(MAX(bsdf_pdf, 1e-30f), light_pdf) : 1.0f;
+    return scaled(shines ? weight : 0.0f, material_vec3(material->emission));
+}

@@ -1,0 +1,83 @@
+#include "path/state.cl"
+
+// The stack of dielectrics that enclose a point: C. M. Schmidt and B. Budge, Simple Nested Dielectrics in
+// Ray Traced Images, JGT 7(2), 2002. It is sorted by priority; its first entry is the medium that is seen,
+// the others are covered by it. Four 16-bit material indices, MEDIUM_NONE where there is none.
+
+typedef struct {
+    uint entry[MEDIUM_STACK_SIZE];
+} MediumStack;
+
+INLINE MediumStack load_medium_stack(const State *state, uint path) {
+    uint low = load_bits(state->paths, PATH_MEDIUM_0 * STRIDE(state) + path);
+    uint high = load_bits(state->paths, PATH_MEDIUM_1 * STRIDE(state) + path);
+    MediumStack stack;
+    stack.entry[0] = low & 0xffffu;
+    stack.entry[1] = low >> 16;
+    stack.entry[2] = high & 0xffffu;
+    stack.entry[3] = high >> 16;
+    return stack;
+}
+
+INLINE void store_medium_stack(const State *state, uint path, const MediumStack *stack) {
+    store_bits(state->paths, PATH_MEDIUM_0 * STRIDE(state) + path, stack->entry[0] | (stack->entry[1] << 16));
+    store_bits(state->paths, PATH_MEDIUM_1 * STRIDE(state) + path, stack->entry[2] | (stack->entry[3] << 16));
+}
+
+// The properties of a medium, or of any material in place of none: all lanes read one.
+INLINE __global const Material *medium_material(__global const Material *materials, uint medium) {
+    return &materials[medium == MEDIUM_NONE ? 0u : medium];
+}
+
+// The higher wins; 0 is the highest of all.
+INLINE uint effective_priority(__global const Material *materials, uint medium) {
+    uint priority = medium_material(materials, medium)->priority;
+    return priority == 0u ? 0xffffffffu : priority;
+}
+
+// Puts a medium above all that do not win over it. The lowest entry of a full stack is forgotten.
+INLINE void enter_medium(MediumStack *stack, __global const Material *materials, uint material) {
+    uint priority = effective_priority(materials, material);
+    uint carried = material;
+    int placed = 0;
+#pragma unroll
+    for (uint i = 0u; i < MEDIUM_STACK_SIZE; i++) {
+        uint here = stack->entry[i];
+        int wins = (here != MEDIUM_NONE) & (effective_priority(materials, here) > priority);
+        placed |= !wins;
+        stack->entry[i] = placed ? carried : here;
+        carried = placed ? here : carried;
+    }
+}
+
+// Takes the first entry of that medium out; returns whether there was one.
+INLINE int leave_medium(MediumStack *stack, uint material) {
+    int found = 0;
+#pragma unroll
+    for (uint i = 0u; i < MEDIUM_STACK_SIZE; i++) {
+        uint next = i + 1u < MEDIUM_STACK_SIZE ? stack->entry[(i + 1u) % MEDIUM_STACK_SIZE] : MEDIUM_NONE;
+        found |= stack->entry[i] == material;
+        stack->entry[i] = found ? next : stack->entry[i];
+    }
+    return found;
+}
+
+INLINE float medium_ior(__global const Material *materials, uint medium) {
+    float ior = medium_material(materials, medium)->ior;
+    return medium == MEDIUM_NONE ? 1.0f : ior;
+}
+
+// What a medium lets through over a distance in metres, which may be infinite (Beer and Lambert). The variant
+// CLEAR_MEDIA serves scenes whose media absorb nothing.
+INLINE Vec3 transmittance(__global const Material *materials, uint medium, float distance) {
+#ifdef CLEAR_MEDIA
+    return vec3(1.0f, 1.0f, 1.0f);
+#else
+    int vacuum = medium == MEDIUM_NONE;
+    __global const float *a = medium_material(materials, medium)->absorption;
+    Vec3 depth = vec3(a[0] > 0.0f ? a[0] * distance : 0.0f, a[1] > 0.0f ? a[1] * distance : 0.0f,
+                      a[2] > 0.0f ? a[2] * distance : 0.0f);
+    depth = choose(vacuum, vec3(0.0f, 0.0f, 0.0f), depth);
+    return vec3(exp_negative(-depth.x), exp_negative(-depth.y), exp_negative(-depth.z));
+#endif
+}

@@ -1,0 +1,1 @@
+"""Acceleration structures: trees over triangles and objects, and brute force where there are few."""

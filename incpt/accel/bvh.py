@@ -1,0 +1,385 @@
+"""Bounding volume hierarchies: one per mesh, and one over the objects of a scene.
+
+Layer L2, above `device`, because the builder is an OpenCL kernel (cl/build_bvh.cl): in numpy the binned
+surface area heuristic takes tens of seconds for a million triangles, on the device less than one. The
+host drives it level by level; it sums up how many children each level has, which keeps the tree
+deterministic and its levels contiguous, so that a refit goes through them backwards.
+
+Nodes are 8-wide (Wald, Benthin and Boulos 2008, "Getting Rid of Packets"), leaves are packs of up to
+eight triangles: box and triangle tests both fill a float8.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from incpt.core import layout
+from incpt.core.errors import InputError
+from incpt.device.device import Device
+from incpt.scene.mesh import Mesh
+
+LARGEST_SERIAL_RANGE = 1 << 15
+"""Boxes that one work-item may split alone; larger ranges are too few to keep a device busy."""
+CHUNK = 1 << 12
+"""Boxes that one work-item takes of such a range."""
+
+_FILE = "build_bvh"
+
+# Rounding errors of a hit in units of float32's half ulp: of its position (seven operations of interpolation
+# and three of transform, pbrt-v4 section 6.8), and of the next ray's test against the same triangle, which
+# was measured (4 do, 2 do not).
+_POSITION_ULPS = 10
+_TEST_ULPS = 8
+_HALF_ULP = 2.0**-24
+
+
+@dataclass(frozen=True, eq=False)
+class Bvh:
+    """A tree as `layout.NODE` and `layout.TRIANGLE_PACK` describe it.
+
+    nodes   (N,) NODE, breadth first, the root first; child references are relative to this array.
+    packs   (P,) TRIANGLE_PACK, one per leaf; empty for a top level, whose leaves are object indices.
+    levels  where each level starts in `nodes`, and their end: level i is nodes[levels[i]:levels[i + 1]].
+    bounds  (2, 3) float32 least and greatest coordinates; least above greatest where the tree is empty.
+    """
+
+    nodes: npt.NDArray[np.void]
+    packs: npt.NDArray[np.void]
+    levels: tuple[int, ...]
+    bounds: npt.NDArray[np.float32]
+
+
+def build_mesh(device: Device, mesh: Mesh) -> Bvh:
+    """The tree of a mesh, in its object space. Faces without area keep their place, but no ray meets them.
+
+    Raises DeviceError where the device's memory runs out.
+    """
+    return build_triangles(device, mesh.vertices, mesh.faces)
+
+
+def build_triangles(device: Device, vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int32]) -> Bvh:
+    """The tree of `faces` (F, 3), indices of `vertices` (V, 3); see `build_mesh`."""
+    count = len(faces)
+    vertex_buffer, face_buffer = device.upload(vertices), device.upload(faces)
+    boxes = device.empty(count * 32)
+    device.launch(
+        device.kernel("bound_faces", _FILE), count, np.uint32(count), face_buffer, vertex_buffer, boxes
+    )
+    return _build(device, count, layout.BVH_WIDTH, boxes, face_buffer, vertex_buffer)
+
+
+def refit_mesh(device: Device, bvh: Bvh, mesh: Mesh) -> Bvh:
+    """The tree `bvh` of a mesh with the same faces, fitted to the vertices of `mesh`.
+
+    The shape of the tree stays, so that it suits the mesh the worse the more it is deformed.
+    Raises InputError where the number of faces differs.
+    """
+    if np.count_nonzero(bvh.packs["face"] != layout.NO_INDEX) != len(mesh.faces):
+        raise InputError(f"mesh: has {len(mesh.faces)} faces, its tree another number; build it anew")
+    vertices, faces = device.upload(mesh.vertices), device.upload(mesh.faces)
+    nodes, packs = device.upload(bvh.nodes), device.upload(bvh.packs)
+    count = len(bvh.packs)
+    device.launch(device.kernel("refit_packs", _FILE), count, np.uint32(count), packs, faces, vertices)
+    kernel = device.kernel("refit_nodes", _FILE)
+    for first, end in reversed(list(zip(bvh.levels, bvh.levels[1:], strict=False))):
+        size = end - first
+        device.launch(kernel, size, np.uint32(size), np.uint32(first), nodes, packs, faces, vertices)
+    new_nodes = device.read(nodes, np.empty_like(bvh.nodes))
+    new_packs = device.read(packs, np.empty_like(bvh.packs))
+    return Bvh(new_nodes, new_packs, bvh.levels, _root_bounds(new_nodes))
+
+
+def build_top(device: Device, bounds: npt.NDArray[np.floating[Any]]) -> Bvh:
+    """The tree over objects with world-space bounds (N, 2, 3); each leaf is one object.
+
+    Boxes are widened to the next float32 outwards, so that bounds may come in float64.
+    """
+    if len(bounds) == 0:
+        return _empty_tree()
+    boxes = np.zeros((len(bounds), 8), np.float32)
+    infinity = np.float32(np.inf)
+    boxes[:, 0:3] = np.nextafter(bounds[:, 0].astype(np.float32), -infinity)
+    boxes[:, 4:7] = -np.nextafter(bounds[:, 1].astype(np.float32), infinity)
+    boxes[:, 3] = np.arange(len(bounds), dtype=np.uint32).view(np.float32)
+    return _build(device, len(bounds), 1, device.upload(boxes))
+
+
+def build_top_with_triangles(
+    device: Device,
+    bounds: npt.NDArray[np.floating[Any]],
+    objects: npt.NDArray[np.integer[Any]],
+    triangles: Bvh | None,
+) -> npt.NDArray[np.void]:
+    """Nodes of the top level over `objects`, indices (N,) with world-space bounds (N, 2, 3), and over the
+    packs of `triangles`, a tree in world space, which becomes a branch of the top level."""
+    if triangles is None:
+        return _with_leaves(build_top(device, bounds), objects)
+    packs = _with_leaves(triangles, np.arange(len(triangles.packs)) | layout.NODE_PACK)
+    if len(objects) == 0:
+        return packs
+    both = np.concatenate([bounds, triangles.bounds[None]])
+    nodes = _with_leaves(build_top(device, both), np.append(objects, layout.NODE_PACK))
+    # The leaf that stands for all triangles becomes the root of their tree.
+    nodes["child"][nodes["child"] == layout.NODE_LEAF | layout.NODE_PACK] = len(nodes)
+    inner = packs["child"] < layout.NODE_PACK
+    packs["child"][inner] += np.uint32(len(nodes))
+    return np.concatenate([nodes, packs])
+
+
+def _with_leaves(tree: Bvh, references: npt.NDArray[np.integer[Any]]) -> npt.NDArray[np.void]:
+    """The nodes of a tree whose leaf i refers to references[i]."""
+    nodes = tree.nodes.copy()
+    child = nodes["child"]
+    leaves = (child >= layout.NODE_LEAF) & (child != layout.NODE_EMPTY)
+    child[leaves] = references[child[leaves] & ~np.uint32(layout.NODE_LEAF)] | layout.NODE_LEAF
+    return nodes
+
+
+def position_error(
+    bounds: npt.NDArray[np.floating[Any]],
+    world_from_object: npt.NDArray[np.float64],
+    object_from_world: npt.NDArray[np.float64],
+) -> npt.NDArray[np.float64]:
+    """(3,) how far a hit on an object may lie off its surface by rounding, along each axis, in metres.
+
+    `bounds` (2, 3) are those of the mesh in object space; the matrices are (3, 4). As in pbrt-v4 section 6.8,
+    the bound contains the interpolation of the position, its way to world space, that of the next ray's
+    origin back to object space, and the next ray's test. One bound per object instead of one per triangle:
+    the largest coordinates count, and for a hit it costs three multiplications.
+    """
+    w, m = np.abs(world_from_object), np.abs(object_from_world)
+    world = w[:, :3] @ np.abs(bounds).max(axis=0) + w[:, 3]
+    back = m[:, :3] @ world + m[:, 3]
+    extent = w[:, :3] @ (bounds[1] - bounds[0]).astype(np.float64)
+    error = _POSITION_ULPS * (world + w[:, :3] @ back) + _TEST_ULPS * extent.max()
+    return np.asarray(_HALF_ULP * error)
+
+
+def _empty_tree() -> Bvh:
+    nodes = np.zeros(1, layout.NODE)
+    nodes["bounds"][:, 0::2] = np.inf
+    nodes["bounds"][:, 1::2] = -np.inf
+    nodes["child"] = layout.NODE_EMPTY
+    return Bvh(nodes, np.empty(0, layout.TRIANGLE_PACK), (0, 1), _root_bounds(nodes))
+
+
+def _build(
+    device: Device, count: int, leaf_size: int, boxes: Any, faces: Any = None, vertices: Any = None
+) -> Bvh:
+    # A top level has no faces: its kernel arguments are filled with any buffer and never read.
+    mesh = (faces, vertices) if faces is not None else (boxes, boxes)
+    splitter = _Splitter(device, boxes, leaf_size) if count > LARGEST_SERIAL_RANGE else None
+    ranges = device.upload(np.array([0, count], np.uint32))
+    range_count, node_count, pack_count = 1, 0, 0
+    nodes, packs, levels = [], [], [0]
+    while range_count:
+        capacity = min(leaf_size * 8 ** (layout.BVH_MAX_DEPTH - len(levels)), 0xFFFFFFFF)
+        level = _Level(device, range_count, leaf_size)
+        level.split(boxes, ranges, capacity)
+        if splitter is not None and not level.split_large(splitter, ranges, capacity):
+            splitter = None  # the ranges of further levels are smaller still
+        offsets, inner, leaves = level.sum_up()
+        node_count += range_count
+        ranges = device.empty(inner * 8)
+        nodes.append(level.nodes_array)
+        packs.append(level.link(boxes, offsets, node_count, pack_count, leaves, ranges, mesh))
+        pack_count += leaves if leaf_size > 1 else 0
+        range_count = inner
+        levels.append(node_count)
+    all_nodes = np.concatenate(nodes)
+    return Bvh(all_nodes, np.concatenate(packs), tuple(levels), _root_bounds(all_nodes))
+
+
+class _Level:
+    """The device buffers of one level while it is being built."""
+
+    def __init__(self, device: Device, count: int, leaf_size: int) -> None:
+        self.device, self.count, self.leaf_size = device, count, leaf_size
+        self.nodes = device.empty(count * layout.NODE.itemsize)
+        self.children = device.empty(count * layout.BVH_WIDTH * 8)
+        self.counts = device.empty(count * 8)
+        self.nodes_array = np.empty(count, layout.NODE)
+
+    def split(self, boxes: Any, ranges: Any, capacity: int) -> None:
+        """Splits every range but those that are left to `split_large`."""
+        device = self.device
+        sizes = (np.uint32(n) for n in (self.count, self.leaf_size, capacity, LARGEST_SERIAL_RANGE))
+        buffers = boxes, ranges, self.nodes, self.children, self.counts
+        kernel = device.kernel("split_ranges", _FILE)
+        # Ranges differ in size by far: a group of its own for each spreads them best over the cores.
+        group = 1 if device.is_cpu else None
+        device.launch(kernel, self.count, *sizes, *buffers, work_group=group)
+
+    def split_large(self, splitter: _Splitter, ranges: Any, capacity: int) -> bool:
+        """Splits the ranges that are too large for one work-item. False where there are none."""
+        device, count = self.device, self.count
+        sizes = device.read(ranges, np.empty((count, 2), np.uint32))
+        large = np.flatnonzero(sizes[:, 1] > LARGEST_SERIAL_RANGE)
+        if len(large) == 0:
+            return False
+        children = device.read(self.children, np.empty((count, layout.BVH_WIDTH, 2), np.uint32))
+        counts = device.read(self.counts, np.empty((count, 2), np.uint32))
+        device.read(self.nodes, self.nodes_array)
+        for i in large:
+            start, size = (int(n) for n in sizes[i])
+            parts = splitter.split(start, size, even=size > capacity)
+            leaves = sum(part.count <= self.leaf_size for part in parts)
+            children[i] = 0
+            children[i, : len(parts)] = [(part.start, part.count) for part in parts]
+            counts[i] = len(parts) - leaves, leaves
+            bounds = np.full((8, layout.BVH_WIDTH), np.inf, np.float32)
+            bounds[:, : len(parts)] = np.stack([part.bounds for part in parts], axis=1)
+            self.nodes_array[i]["bounds"][0::2] = bounds[0:3]
+            self.nodes_array[i]["bounds"][1::2] = -bounds[4:7]
+        for buffer, array in (
+            (self.children, children),
+            (self.counts, counts),
+            (self.nodes, self.nodes_array),
+        ):
+            device.write(buffer, array)
+        return True
+
+    def sum_up(self) -> tuple[npt.NDArray[np.uint32], int, int]:
+        """Inner children and leaves before each node (count, 2), and the sums of both."""
+        counts = self.device.read(self.counts, np.empty((self.count, 2), np.uint32))
+        sums = np.cumsum(counts, axis=0, dtype=np.uint32)
+        offsets = np.concatenate([np.zeros((1, 2), np.uint32), sums[:-1]])
+        return offsets, int(sums[-1, 0]), int(sums[-1, 1])
+
+    def link(
+        self,
+        boxes: Any,
+        offsets: npt.NDArray[np.uint32],
+        next_node: int,
+        next_pack: int,
+        leaves: int,
+        next_ranges: Any,
+        mesh: tuple[Any, Any],
+    ) -> npt.NDArray[np.void]:
+        """Refers the nodes to their children, reads them back, and returns the packs of the leaves."""
+        device = self.device
+        packs_array = np.empty(leaves if self.leaf_size > 1 else 0, layout.TRIANGLE_PACK)
+        packs = device.empty(packs_array.nbytes)
+        sizes = (np.uint32(n) for n in (self.count, self.leaf_size, next_node, next_pack))
+        buffers = boxes, self.children, device.upload(offsets), self.nodes, next_ranges, packs
+        device.launch(device.kernel("link_children", _FILE), self.count, *sizes, *buffers, *mesh)
+        device.read(self.nodes, self.nodes_array)
+        if len(packs_array):
+            device.read(packs, packs_array)
+        return packs_array
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A range of boxes; what surrounds them, and twice their centres, as a Box of cl/build_bvh.cl."""
+
+    start: int
+    count: int
+    bounds: npt.NDArray[np.float32]
+    centers: npt.NDArray[np.float32]
+
+
+class _Splitter:
+    """Splits ranges that are too large for one work-item: in chunks on the device, the plane chosen here."""
+
+    def __init__(self, device: Device, boxes: Any, leaf_size: int) -> None:
+        self.device, self.boxes, self.leaf_size = device, boxes, leaf_size
+        self.moved = device.empty(boxes.size)
+
+    def split(self, start: int, count: int, even: bool) -> list[_Part]:
+        """Up to eight parts of a range, found as `split_ranges` does it."""
+        parts = [self._measure(start, count)]
+        while len(parts) < layout.BVH_WIDTH:
+            sizes = [part.count if even else float(_area(part.bounds)) for part in parts]
+            candidates = [i for i, part in enumerate(parts) if part.count > self.leaf_size]
+            if not candidates:
+                break
+            chosen = max(candidates, key=sizes.__getitem__)
+            part = parts[chosen]
+            middle = part.start + (part.count // 2 if even else self._partition(part))
+            parts[chosen] = self._measure(part.start, middle - part.start)
+            parts.append(self._measure(middle, part.start + part.count - middle))
+        return parts
+
+    def _launch(self, name: str, count: int, *args: Any) -> None:
+        group = 1 if self.device.is_cpu else None
+        self.device.launch(self.device.kernel(name, _FILE), count, np.uint32(count), *args, work_group=group)
+
+    def _measure(self, start: int, count: int) -> _Part:
+        chunks = _chunks(start, count)
+        bounds = self.device.empty(len(chunks) * 64)
+        self._launch("measure_chunks", len(chunks), self.device.upload(chunks), self.boxes, bounds)
+        least = self.device.read(bounds, np.empty((len(chunks), 2, 8), np.float32)).min(axis=0)
+        return _Part(start, count, least[0], least[1])
+
+    def _partition(self, part: _Part) -> int:
+        """Reorders a part by the cheapest split; the number of boxes on its lower side."""
+        device = self.device
+        chunks = _chunks(part.start, part.count)
+        chunk_buffer = device.upload(chunks)
+        origin = part.centers[0:3]
+        extent = -part.centers[4:7] - origin
+        with np.errstate(divide="ignore"):
+            scale = np.float32(layout.BVH_BINS * 0.999) / extent
+        scale = np.where((extent > 0) & (scale < 1e30), scale, np.float32(0))
+        bins, counts = self._bin(chunk_buffer, len(chunks), origin, scale)
+        split = _cheapest_split(bins, counts.sum(axis=0, dtype=np.int64), self.leaf_size)
+        if split is None:
+            return part.count // 2  # all centres coincide: one order is as good as another
+        axis, position = split
+        left = counts[:, axis, :position].sum(axis=1, dtype=np.uint32)
+        lower = int(left.sum())
+        before = np.cumsum(left, dtype=np.uint32) - left
+        offsets = np.stack([part.start + before, lower + chunks[:, 0] - before], axis=1).astype(np.uint32)
+        numbers = np.uint32(axis), np.uint32(position), origin[axis], scale[axis]
+        buffers = chunk_buffer, device.upload(offsets), self.boxes, self.moved
+        self._launch("scatter_chunks", len(chunks), *numbers, *buffers)
+        self._launch("copy_chunks", len(chunks), chunk_buffer, self.moved, self.boxes)
+        return lower
+
+    def _bin(
+        self, chunks: Any, count: int, origin: npt.NDArray[np.float32], scale: npt.NDArray[np.float32]
+    ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.uint32]]:
+        """Boxes of the bins (3, bins, 8), and how many boxes each chunk put in them (count, 3, bins)."""
+        bin_buffer = self.device.empty(count * 3 * layout.BVH_BINS * 32)
+        count_buffer = self.device.empty(count * 3 * layout.BVH_BINS * 4)
+        self._launch("bin_chunks", count, *origin, *scale, chunks, self.boxes, bin_buffer, count_buffer)
+        bins = self.device.read(bin_buffer, np.empty((count, 3, layout.BVH_BINS, 8), np.float32))
+        counts = self.device.read(count_buffer, np.empty((count, 3, layout.BVH_BINS), np.uint32))
+        return bins.min(axis=0), counts
+
+
+def _chunks(start: int, count: int) -> npt.NDArray[np.uint32]:
+    """(chunks, 2) start and size of equal pieces of a range."""
+    edges = np.linspace(start, start + count, -(-count // CHUNK) + 1).astype(np.uint32)
+    return np.stack([edges[:-1], np.diff(edges)], axis=1)
+
+
+def _area(box: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Half the surface of boxes (..., 8): lower bounds first, then the negated upper ones."""
+    size = -box[..., 4:7] - box[..., 0:3]
+    area: npt.NDArray[np.float32] = (size * np.roll(size, 1, axis=-1)).sum(axis=-1)
+    return area
+
+
+def _cheapest_split(
+    bins: npt.NDArray[np.float32], counts: npt.NDArray[np.int64], leaf_size: int
+) -> tuple[int, int] | None:
+    """Axis and first bin of the upper side, by the surface area heuristic; None where nothing separates."""
+    lower, upper = counts.cumsum(axis=1)[:, :-1], counts[:, ::-1].cumsum(axis=1)[:, ::-1][:, 1:]
+    lower_box = np.minimum.accumulate(bins, axis=1)[:, :-1]
+    upper_box = np.minimum.accumulate(bins[:, ::-1], axis=1)[:, ::-1][:, 1:]
+    with np.errstate(invalid="ignore"):  # an empty side has an infinite box
+        cost = _area(lower_box) * -(-lower // leaf_size) + _area(upper_box) * -(-upper // leaf_size)
+    cost = np.where((lower > 0) & (upper > 0), cost, np.inf)
+    axis, position = np.unravel_index(cost.argmin(), cost.shape)
+    return (int(axis), int(position) + 1) if np.isfinite(cost[axis, position]) else None
+
+
+def _root_bounds(nodes: npt.NDArray[np.void]) -> npt.NDArray[np.float32]:
+    planes = nodes["bounds"][0]
+    return np.stack([planes[0::2].min(axis=1), planes[1::2].max(axis=1)])

@@ -1,0 +1,51 @@
+"""Options that several commands share, and what they are read into."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from incpt.core.errors import InputError
+from incpt.core.settings import RenderSettings
+from incpt.render.tiles import TileGrid
+from incpt.scene.model import Scene
+
+SceneArgument = Annotated[Path, typer.Argument(help="Scene file (.toml).", show_default=False)]
+DeviceOption = Annotated[
+    str | None,
+    typer.Option(
+        "--device", help="Index or part of the name, as `incpt devices` lists them [or INCPT_DEVICE]."
+    ),
+]
+SizeOption = Annotated[str | None, typer.Option("--size", help="Width and height, such as 960x540.")]
+SeedOption = Annotated[int | None, typer.Option("--seed", help="Chooses the random numbers.")]
+BouncesOption = Annotated[
+    int | None, typer.Option("--max-bounces", help="Scattering events after the first hit.")
+]
+
+
+def settings_from(scene: Scene, size: str | None, **given: Any) -> RenderSettings:
+    """The scene's settings with those of the command line in their place, where there are any."""
+    changes = {name: value for name, value in given.items() if value is not None}
+    if size is not None:
+        changes["size"] = _parse_size(size)
+    try:
+        return replace(scene.settings, **changes)
+    except InputError as error:
+        raise InputError(f"--{str(error).replace('_', '-', 1)}") from None
+
+
+def padded_pixels(settings: RenderSettings) -> int:
+    """Paths of one sample per pixel: cut tiles trace as many as whole ones."""
+    return TileGrid(*settings.size, settings.tile_size).count * settings.tile_size**2
+
+
+def _parse_size(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d{1,9})[x×,](\d{1,9})", text.strip().lower())
+    if match is None:
+        raise InputError(f"--size: {text!r} is not a width and a height; write it like 960x540")
+    return int(match[1]), int(match[2])

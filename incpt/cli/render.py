@@ -1,0 +1,87 @@
+"""`incpt render`: a scene as a picture."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from incpt.cli.console import Stopped, complain, interruption, path_progress
+from incpt.cli.options import (
+    BouncesOption,
+    DeviceOption,
+    SceneArgument,
+    SeedOption,
+    SizeOption,
+    padded_pixels,
+    settings_from,
+)
+from incpt.core.errors import InputError, OutputError
+from incpt.formats import registry
+from incpt.render.export import SUFFIXES, write_picture
+from incpt.render.session import Session, StepReport
+
+
+def render(
+    scene_file: SceneArgument,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help=".exr: linear radiance; .png: tone-mapped sRGB.")
+    ],
+    spp: Annotated[int, typer.Option(help="Samples per pixel.", min=1)] = 256,
+    size: SizeOption = None,
+    seed: SeedOption = None,
+    strategy: Annotated[str | None, typer.Option(help="restart or spiral.")] = None,
+    max_bounces: BouncesOption = None,
+    aovs: Annotated[
+        bool, typer.Option("--aovs", help="Put object ids, normals, depth and base colours into the .exr.")
+    ] = False,
+    device: DeviceOption = None,
+) -> None:
+    """Render a scene to a picture. Ctrl-C keeps what is done."""
+    _check_picture_path(output)
+    if aovs and output.suffix.lower() != ".exr":
+        raise InputError(f"--aovs: {output} cannot hold them; use an .exr")
+    scene = registry.load(scene_file)
+    settings = settings_from(scene, size=size, seed=seed, strategy=strategy, max_bounces=max_bounces)
+    session = Session(scene, settings=settings, device=device)
+    pixels = padded_pixels(settings)
+    nonfinite = 0
+    with interruption() as stop, path_progress("rendering", spp * pixels, pixels) as progress:
+
+        def on_step(report: StepReport) -> None:
+            nonlocal nonfinite
+            nonfinite += report.nonfinite
+            progress.advance(report.paths)
+            stop.check()
+
+        try:
+            session.render(spp, on_step)
+        except KeyboardInterrupt:
+            if not stop.requested:
+                raise
+        # Still inside, so that another Ctrl-C does not tear the picture that is kept.
+        write_picture(output, session, aovs)
+    samples = int(session.spp().min())
+    if nonfinite:
+        complain(f"warning: {nonfinite:,} samples were not finite and count as black", 0)
+    print(f"{output}: {session.size[0]} x {session.size[1]}, {samples} samples per pixel")
+    if stop.requested:
+        raise Stopped(f"stopped at {samples} of {spp} samples per pixel")
+
+
+def _check_picture_path(path: Path) -> None:
+    """Before the long work: a suffix that names a format, and a place that can be written."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"-o {path}: ends in no known format; use .exr or .png")
+    if path.is_dir():
+        raise OutputError(f"{path}: is a folder; name a file in it")
+    _check_folder(path.parent)
+
+
+def _check_folder(folder: Path) -> None:
+    if not folder.is_dir():
+        raise OutputError(f"{folder}: no such folder; make it first")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise OutputError(f"{folder}: cannot be written; choose another folder")

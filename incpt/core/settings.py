@@ -1,0 +1,109 @@
+"""How to render, apart from what: frozen, validated, with the defaults of the thesis."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from typing import Any
+
+from incpt.core.errors import InputError
+
+STRATEGIES = ("restart", "spiral")
+POINTS_OF_CHANGE = ("bounds", "pixel")
+MAX_IMAGE_PIXELS = 1 << 26
+"""8,192 x 8,192: what fits the 32-bit plane indices of the kernels with room to spare."""
+
+
+@dataclass(frozen=True)
+class RenderSettings:
+    """Settings of a session. Defaults: thesis, section 4.2 (tile 16, rate 1, 3 bounces, NoR 1/1/256).
+
+    size                  width and height of the image, pixels.
+    max_bounces           scattering events after the first hit; 0 is direct light only.
+    transmission_bounces  passages through smooth dielectrics, counted apart.
+    roulette_depth        scattering events before Russian roulette may end a path.
+    tile_size             edge of a tile, pixels.
+    nor                   repetitions of a tile while an edit is re-rendered (NoR of INCREMENTAL).
+    base_nor              repetitions in BASE and REFINE.
+    sample_rate           paths per pixel and slot.
+    strategy              "restart" (every edit starts over) or "spiral" (the thesis).
+    point_of_change       "bounds" (centre of the object's 2D bounding box, old and new place) or
+                          "pixel" (the pixel given with the edit: the thesis's choice).
+    slots_per_step        tiles that fit one step; None: as many as the image has (the thesis).
+    seed                  chooses the random numbers.
+    """
+
+    size: tuple[int, int] = (960, 540)
+    max_bounces: int = 3
+    transmission_bounces: int = 12
+    roulette_depth: int = 4
+    tile_size: int = 16
+    nor: int = 256
+    base_nor: int = 1
+    sample_rate: int = 1
+    strategy: str = "spiral"
+    point_of_change: str = "bounds"
+    slots_per_step: int | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        width, height = _whole_pair(self.size)
+        object.__setattr__(self, "size", (width, height))
+        if width * height > MAX_IMAGE_PIXELS:
+            raise InputError(
+                f"size: {width} x {height} is more than {MAX_IMAGE_PIXELS:,} pixels; choose a smaller image"
+            )
+        for name, (low, high) in _RANGES.items():
+            value = getattr(self, name)
+            if name == "slots_per_step" and value is None:
+                continue
+            object.__setattr__(self, name, _whole(name, value, low, high))
+        _one_of("strategy", self.strategy, STRATEGIES)
+        _one_of("point_of_change", self.point_of_change, POINTS_OF_CHANGE)
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Names of all settings, in order of declaration."""
+        return tuple(field.name for field in fields(cls))
+
+
+_RANGES: dict[str, tuple[int, int]] = {
+    "max_bounces": (0, 200),
+    "transmission_bounces": (0, 200),
+    "roulette_depth": (0, 255),
+    "tile_size": (1, 1024),
+    "nor": (1, 1 << 16),
+    "base_nor": (1, 1 << 16),
+    "sample_rate": (1, 4096),
+    "slots_per_step": (1, 1 << 24),
+    "seed": (0, (1 << 32) - 1),
+}
+
+
+def _whole(name: str, value: Any, low: int, high: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) and not _is_integral(value):
+        raise InputError(f"{name}: {value!r} is not a whole number; use one from {low} to {high}")
+    if not low <= value <= high:
+        raise InputError(f"{name}: {value} is out of range; use a whole number from {low} to {high}")
+    return int(value)
+
+
+def _is_integral(value: Any) -> bool:
+    return hasattr(value, "__index__")
+
+
+def _whole_pair(value: Any) -> tuple[int, int]:
+    if not isinstance(value, Iterable) or isinstance(value, str) or len(pair := list(value)) != 2:
+        raise InputError(f"size: {value!r} is not a pair of width and height, such as [960, 540]")
+    limit = math.isqrt(MAX_IMAGE_PIXELS) * 4
+    return _whole("size (width)", pair[0], 1, limit), _whole("size (height)", pair[1], 1, limit)
+
+
+def _one_of(name: str, value: Any, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise InputError(f"{name}: {value!r} is not known; choose one of {', '.join(choices)}")
+
+
+# Settings that change what a sample is worth, so that what was accumulated cannot be kept.
+PICTURE_SETTINGS = ("max_bounces", "transmission_bounces", "roulette_depth", "seed")

@@ -1,0 +1,120 @@
+"""Leaves out the faces of a file that cannot be rendered, counts them, and makes a mesh of the rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import trimesh
+
+from incpt.core.errors import InputError
+from incpt.scene.checks import LARGEST
+from incpt.scene.mesh import Mesh
+
+DEGENERATE = 1e-12
+"""Twice the area of a face over its longest edge squared: below it the face has no normal to speak of."""
+
+
+def placed_mesh(
+    geometry: trimesh.Trimesh, matrix: npt.NDArray[np.float64], counts: dict[str, int], with_normals: bool
+) -> Mesh | None:
+    """The geometry in the space of the file, without its unusable faces, which are added to `counts`."""
+    vertices = np.asarray(geometry.vertices, np.float64)
+    faces = np.asarray(geometry.faces, np.int64)
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
+        raise InputError("has vertices without three coordinates; the file is damaged")
+    normals: npt.NDArray[np.float64] | None = None
+    # Normals stand in the cache only where the loader put them; the property makes them up.
+    if with_normals and "vertex_normals" in geometry._cache:
+        normals = np.asarray(geometry.vertex_normals, np.float64)
+        normals = normals if normals.shape == vertices.shape else None
+    if not np.array_equal(matrix, np.eye(4)):
+        with np.errstate(all="ignore"):
+            linear = matrix[:3, :3]
+            vertices = vertices @ linear.T + matrix[:3, 3]
+            if normals is not None:
+                # The cofactor matrix is det · inverse transpose, and exists for flat placements too.
+                x, y, z = linear.T
+                cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=1)
+                normals = normals @ cofactors.T * np.sign(np.linalg.det(linear))
+            if np.linalg.det(linear) < 0:
+                faces = faces[:, ::-1]
+    with np.errstate(all="ignore"):
+        stored = vertices.astype(np.float32)
+    usable = _usable_faces(stored, faces, counts)
+    if not usable.any():
+        return None
+    finite = np.all(np.abs(stored) <= LARGEST, axis=1)
+    stored = np.where(finite[:, None], stored, np.float32(0))  # no face uses those any more
+    faces = faces[usable]
+    corner_normals = None if normals is None else _corner_normals(stored, faces, normals)
+    return Mesh(stored, faces.astype(np.int32), corner_normals)
+
+
+def _usable_faces(
+    vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int64], counts: dict[str, int]
+) -> npt.NDArray[np.bool_]:
+    """(F,) which faces to keep; the reasons against the others are counted."""
+    usable: npt.NDArray[np.bool_] = np.all((faces >= 0) & (faces < len(vertices)), axis=1)
+    in_range = np.where(usable[:, None], faces, 0)
+    _count(counts, "in all", len(faces))
+    _count(counts, "with an index out of range", int((~usable).sum()))
+    if not len(vertices):
+        return usable
+    finite = np.all(np.abs(vertices) <= LARGEST, axis=1)  # False for NaN too
+    bad = usable & ~finite[in_range].all(axis=1)
+    _count(counts, "with a vertex that is not finite or too far away", int(bad.sum()))
+    usable &= ~bad
+    with np.errstate(all="ignore"):
+        a, b, c = (vertices[in_range[:, corner]].astype(np.float64) for corner in range(3))
+        ab, ac, bc = b - a, c - a, c - b
+        longest = np.maximum(np.maximum((ab**2).sum(axis=1), (ac**2).sum(axis=1)), (bc**2).sum(axis=1))
+        area = np.linalg.norm(np.cross(ab, ac), axis=1)
+        bad = usable & ~(area > DEGENERATE * longest)
+    _count(counts, "with zero area", int(bad.sum()))
+    usable &= ~bad
+    bad = usable & _repeated(vertices, in_range, usable)
+    _count(counts, "that come twice", int(bad.sum()))
+    return usable & ~bad
+
+
+def _count(counts: dict[str, int], reason: str, number: int) -> None:
+    counts[reason] = counts.get(reason, 0) + number
+
+
+def _repeated(
+    vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int64], usable: npt.NDArray[np.bool_]
+) -> npt.NDArray[np.bool_]:
+    """(F,) which usable faces have the corner positions and the winding of an earlier one.
+
+    By position, not by index: formats without shared vertices repeat them too. Rotating the corners so
+    that the least comes first makes equal faces equal rows.
+    """
+    rows = np.ascontiguousarray(vertices + np.float32(0)).view(np.dtype((np.void, 12))).ravel()
+    _, place = np.unique(rows, return_inverse=True)
+    corners = place[faces[usable]]
+    turn = (corners.argmin(axis=1)[:, None] + np.arange(3)) % 3
+    corners = np.take_along_axis(corners, turn, axis=1)
+    order = np.lexsort(corners.T)  # stable: the first of equal faces comes first
+    again = np.zeros(len(corners), bool)
+    again[order[1:]] = np.all(corners[order[1:]] == corners[order[:-1]], axis=1)
+    result: npt.NDArray[np.bool_] = np.zeros(len(faces), bool)
+    result[usable] = again
+    return result
+
+
+def _corner_normals(
+    vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int64], normals: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float32]:
+    """(F, 3, 3) unit normals; the face's own where the file's have no direction."""
+    with np.errstate(all="ignore"):
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        unit = normals / lengths
+    usable = (np.isfinite(unit).all(axis=1) & (lengths[:, 0] > 1e-12))[faces]
+    corners = unit[faces]
+    if not usable.all():
+        a, b, c = (vertices[faces[:, corner]].astype(np.float64) for corner in range(3))
+        flat = np.cross(b - a, c - a)
+        flat /= np.linalg.norm(flat, axis=1, keepdims=True)
+        corners = np.where(usable[..., None], corners, flat[:, None, :])
+    result: npt.NDArray[np.float32] = corners.astype(np.float32)
+    return result

@@ -1,0 +1,73 @@
+"""Puts files into a scene: meshes as objects, an image as the environment."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from enum import Enum
+from pathlib import Path
+
+from incpt.core.errors import InputError
+from incpt.core.transform import Vector
+from incpt.formats import images, mesh_files
+from incpt.scene import edits
+from incpt.scene.edits import Names
+from incpt.scene.environment import Environment
+from incpt.scene.model import Scene
+
+SCENE_SUFFIXES = (".toml",)
+
+
+ENVIRONMENT_SUFFIXES = (".exr",)
+
+
+class FileKind(Enum):
+    """What a file that is dropped on the window is taken for."""
+
+    SCENE = "scene"
+    MESH = "mesh"
+    ENVIRONMENT = "environment"
+
+
+def add_mesh(
+    scene: Scene, path: str | os.PathLike[str], at: Vector | None = None, material: str | None = None
+) -> tuple[Scene, Names]:
+    """The scene with all meshes of a file, and the new names; see `edits.add_parts`. What the file lost while
+    it was read is told by an InputWarning. Raises InputError."""
+    return edits.add_parts(scene, mesh_files.load_parts(path), Path(path).stem, at, material)
+
+
+def file_kind(path: str | os.PathLike[str]) -> FileKind:
+    """What a file is taken for, by its suffix. Raises InputError for a type that has no use here."""
+    suffix = Path(path).suffix.lower()
+    if suffix in SCENE_SUFFIXES:
+        return FileKind.SCENE
+    if suffix in ENVIRONMENT_SUFFIXES:
+        return FileKind.ENVIRONMENT
+    if suffix[1:] in mesh_files.mesh_suffixes():
+        return FileKind.MESH
+    raise InputError(
+        f"{path}: files of this type cannot be used; drop a scene (.toml), an environment (.exr) "
+        f"or a mesh ({mesh_files.readable_types()})"
+    )
+
+
+def drop_file(scene: Scene, path: str | os.PathLike[str]) -> tuple[Scene, Names]:
+    """The scene with a mesh added or with another environment image; the names of new objects. Raises
+    InputError, also for a scene file: that is to be opened in place of this scene (see `file_kind`)."""
+    kind = file_kind(path)
+    if kind is FileKind.MESH:
+        return add_mesh(scene, path)
+    if kind is FileKind.ENVIRONMENT:
+        return set_environment_image(scene, path), ()
+    raise InputError(f"{path}: is a scene; open it in place of this one")
+
+
+def set_environment_image(scene: Scene, path: str | os.PathLike[str]) -> Scene:
+    """The scene lit by an OpenEXR image at its own radiance. Raises InputError."""
+    image = images.load_image(path)
+    old = scene.environment
+    # A colour that stood alone was a radiance; beside an image it would tint it, and black hide it.
+    color = old.color if old.image is not None and any(old.color) else (1.0, 1.0, 1.0)
+    intensity = old.intensity if old.image is not None and old.intensity > 0 else 1.0
+    return replace(scene, environment=Environment(color, image, old.rotation_y, intensity))

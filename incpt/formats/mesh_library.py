@@ -1,0 +1,41 @@
+"""The meshes that a scene file or an edit script names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from incpt.core.errors import InputError, in_place
+from incpt.formats import mesh_files
+from incpt.formats.toml_kit import text_of
+from incpt.scene import mesh_part
+from incpt.scene.mesh import Mesh
+from incpt.scene.shapes import shape
+
+
+class MeshLibrary:
+    """The meshes that one file names, relative to its folder; each file is read once."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._parts: dict[str, tuple[mesh_part.MeshPart, ...]] = {}
+
+    def meshes(self, table: Mapping[str, Any]) -> list[tuple[str | None, Mesh]]:
+        """(part, mesh) that the keys `shape`, or `mesh` and `part`, of a table ask for. Raises InputError."""
+        if ("shape" in table) == ("mesh" in table):
+            both = "has both `shape` and `mesh`" if "shape" in table else "has neither `shape` nor `mesh`"
+            raise InputError(f"{both}; give it one of them")
+        if "shape" in table:
+            if "part" in table:
+                raise InputError("part: belongs to a mesh file; leave it out beside `shape`")
+            return [(None, shape(text_of(table, "shape", "name a built-in shape")))]
+        name = text_of(table, "mesh", "name a mesh file")
+        if name not in self._parts:
+            with in_place("mesh"):
+                self._parts[name] = mesh_files.load_parts(self.folder / name)
+        parts = self._parts[name]
+        if "part" in table:
+            part = text_of(table, "part", "name a geometry of the mesh file")
+            parts = (mesh_files.choose_part(self.folder / name, parts, part),)
+        return [(p.name, p.mesh) for p in parts]

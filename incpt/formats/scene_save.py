@@ -1,0 +1,177 @@
+"""Writing scene files."""
+
+from __future__ import annotations
+
+import os
+import re
+import warnings
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+
+from incpt.core import files
+from incpt.core.errors import InputError, InputWarning, one_line
+from incpt.formats import images, mesh_files, mesh_store
+from incpt.formats.scene_toml import CAMERA_KEYS, VERSION
+from incpt.scene.environment import Environment
+from incpt.scene.image import Image
+from incpt.scene.mesh import Mesh
+from incpt.scene.model import Object, Scene
+from incpt.scene.shapes import shape
+
+
+def save(scene: Scene, path: str | os.PathLike[str]) -> None:
+    """Writes a scene file, atomically; `load` gives an equal scene back.
+
+    Meshes and images that came from files are named relative to the new file. A mesh or image made or
+    changed in Python is written beside the scene file under a name with a digest of its content. Raises
+    OutputError where a file cannot be written (then nothing is left behind), InputError for a scene
+    that no file can hold.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".toml":
+        raise InputError(f"{path}: a scene is saved as TOML; end its name with .toml")
+    beside = _Beside(path)
+    try:
+        document = _document(scene, beside)
+        files.write_bytes(path, document.encode())
+    except UnicodeEncodeError:
+        beside.undo()
+        raise InputError(f"{path}: a name in the scene is no valid text; rename it") from None
+    except BaseException:
+        beside.undo()
+        raise
+
+
+class _Beside:
+    """Files that a scene file refers to: found, or written beside it."""
+
+    def __init__(self, path: Path) -> None:
+        self._folder = path.parent
+        self._stem = path.stem
+        self._written: list[Path] = []
+        self._names: dict[int, dict[str, str]] = {}
+
+    def undo(self) -> None:
+        """Removes what was written."""
+        for path in self._written:
+            path.unlink(missing_ok=True)
+
+    def mesh(self, mesh: Mesh, name: str) -> dict[str, str]:
+        """The keys of an object that name its mesh."""
+        if id(mesh) not in self._names:
+            self._names[id(mesh)] = self._mesh(mesh, name)
+        return self._names[id(mesh)]
+
+    def _mesh(self, mesh: Mesh, name: str) -> dict[str, str]:
+        source = mesh.source
+        if source.shape is not None and _same_mesh(mesh, shape(source.shape)):
+            return {"shape": source.shape}
+        if source.file is not None and _same_mesh(mesh, _mesh_on_disk(source.file, source.part)):
+            part = {} if source.part is None else {"part": source.part}
+            return {"mesh": self._relative(source.file), **part}
+        label = re.sub(r"[^A-Za-z0-9]+", "-", name)[:40].strip("-") or "mesh"
+        path = self._folder / f"{self._stem}.{label}.{mesh_store.digest(mesh)}.{mesh_store.STORED_SUFFIX}"
+        if not path.exists():
+            mesh_store.store_mesh(path, mesh)
+            self._written.append(path)
+        return {"mesh": path.name}
+
+    def image(self, image: Image) -> str:
+        """The name of an image's file."""
+        if image.source is not None:
+            try:
+                stored = images.load_image(image.source)
+            except InputError:
+                stored = None
+            if stored is not None and np.array_equal(stored.pixels, image.pixels):
+                return self._relative(image.source)
+        path = self._folder / f"{self._stem}.environment.{images.digest(image.pixels)}.exr"
+        if not path.exists():
+            images.write_exr(path, {"RGB": image.pixels})
+            self._written.append(path)
+        return path.name
+
+    def _relative(self, file: str) -> str:
+        # `..` leaves the folder that a link points to, so links are resolved first.
+        absolute = os.path.join(os.path.realpath(os.path.dirname(file)), os.path.basename(file))
+        try:
+            return os.path.relpath(absolute, os.path.realpath(self._folder)).replace(os.sep, "/")
+        except ValueError:  # another drive
+            return os.path.abspath(file)
+
+
+def _mesh_on_disk(file: str, part: str | None) -> Mesh | None:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", InputWarning)
+            return mesh_files.load_mesh(file, part)
+    except InputError:
+        return None
+
+
+def _same_mesh(a: Mesh, b: Mesh | None) -> bool:
+    if b is None or a is b:
+        return a is b
+    if (a.normals is None) != (b.normals is None):
+        return False
+    same_normals = a.normals is None or b.normals is None or np.array_equal(a.normals, b.normals)
+    return same_normals and np.array_equal(a.vertices, b.vertices) and np.array_equal(a.faces, b.faces)
+
+
+def _document(scene: Scene, beside: _Beside) -> str:
+    document = tomlkit.document()
+    document["version"] = VERSION
+    document["camera"] = {name: _toml(getattr(scene.camera, name)) for name in CAMERA_KEYS}
+    document["environment"] = _environment_table(scene.environment, beside)
+    render = _changed(scene.settings)
+    if render:
+        document["render"] = render
+    if scene.materials:
+        document["materials"] = {
+            name: {"base_color": _toml(material.base_color), **_changed(material)}
+            for name, material in scene.materials.items()
+        }
+    if scene.objects:
+        document["objects"] = [_object_table(obj, beside) for obj in scene.objects]
+    try:
+        return tomlkit.dumps(document)
+    except TOMLKitError as error:
+        raise InputError(
+            one_line(f"scene: cannot be written as TOML ({error}); rename what is odd")
+        ) from None
+
+
+def _environment_table(environment: Environment, beside: _Beside) -> dict[str, Any]:
+    table: dict[str, Any] = {"color": _toml(environment.color)}
+    if environment.image is not None:
+        table["image"] = beside.image(environment.image)
+    for name in ("rotation_y", "intensity"):
+        table[name] = getattr(environment, name)
+    return table
+
+
+def _object_table(obj: Object, beside: _Beside) -> dict[str, Any]:
+    table: dict[str, Any] = {"name": obj.name, **beside.mesh(obj.mesh, obj.name), "material": obj.material}
+    for name in ("position", "rotation", "scale"):
+        table[name] = _toml(getattr(obj, name))
+    if not obj.visible:
+        table["visible"] = False
+    return table
+
+
+def _changed(owner: Any) -> dict[str, Any]:
+    """The fields of a dataclass that differ from their defaults."""
+    return {
+        field.name: _toml(getattr(owner, field.name))
+        for field in fields(owner)
+        if field.default is MISSING or getattr(owner, field.name) != field.default
+    }
+
+
+def _toml(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value

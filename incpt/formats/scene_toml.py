@@ -1,0 +1,118 @@
+"""Scene files: TOML, version 1, to and from a Scene.
+
+Every value is checked where it stands, so that an error reads `scenes/a.toml: [[objects]] 3 ("red cube"):
+position: nan is not a finite number`. What a scene may hold is told by the dataclasses of `scene.py` alone:
+their field names are the keys, their own checks the ranges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import fields
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, TypeVar
+
+from incpt.core.errors import InputError, in_place
+from incpt.core.settings import RenderSettings
+from incpt.formats import images
+from incpt.formats.mesh_library import MeshLibrary
+from incpt.formats.toml_kit import check_keys, quoted, read_toml, table_of, text_of
+from incpt.scene.camera import Camera
+from incpt.scene.environment import Environment
+from incpt.scene.material import Material
+from incpt.scene.model import Object, Scene
+
+_T = TypeVar("_T")
+VERSION = 1
+_TABLES = ("version", "camera", "environment", "render", "materials", "objects")
+CAMERA_KEYS = ("position", "target", "up", "fov_y")
+_ENVIRONMENT_KEYS = ("color", "image", "rotation_y", "intensity")
+_OBJECT_KEYS = ("name", "shape", "mesh", "part", "material", "position", "rotation", "scale", "visible")
+_MATERIAL_KEYS = tuple(field.name for field in fields(Material))
+
+
+def load_scene_toml(path: Path) -> Scene:
+    """The scene of a TOML file. Raises InputError, one line that names file, table and key."""
+    tables = read_toml(path)
+    with in_place(str(path)):
+        _check_version(tables)
+        check_keys(tables, _TABLES, "table or key")
+        with in_place("[camera]"):
+            camera = _built(Camera, table_of(tables, "camera"), CAMERA_KEYS)
+        with in_place("[environment]"):
+            environment = _environment(table_of(tables, "environment"), path.parent)
+        with in_place("[render]"):
+            settings = _built(RenderSettings, table_of(tables, "render"), RenderSettings.names())
+        materials = _materials(table_of(tables, "materials"))
+        objects = _objects(tables.get("objects", []), materials, path.parent)
+        return Scene(camera, environment, materials, tuple(objects), settings)
+
+
+def _check_version(tables: Mapping[str, Any]) -> None:
+    if "version" not in tables:
+        raise InputError(f"version: is missing; write `version = {VERSION}` in the first line")
+    version = tables["version"]
+    if version != VERSION or isinstance(version, bool):
+        raise InputError(f"version: {version!r} cannot be read; this program reads version {VERSION}")
+
+
+def _built(kind: type[_T], table: Mapping[str, Any], known: Collection[str]) -> _T:
+    check_keys(table, known)
+    return kind(**table)
+
+
+def _environment(table: dict[str, Any], folder: Path) -> Environment:
+    check_keys(table, _ENVIRONMENT_KEYS)
+    values = dict(table)
+    if "image" in values:
+        with in_place("image"):
+            name = text_of({"image": values["image"]}, "image", "name an OpenEXR file")
+            values["image"] = images.load_image(folder / name)
+        values.setdefault("color", (1.0, 1.0, 1.0))
+    return Environment(**values)
+
+
+def _materials(tables: dict[str, Any]) -> dict[str, Material]:
+    materials = {}
+    for name, table in tables.items():
+        with in_place(f"[materials.{name if name.isidentifier() else quoted(name)}]"):
+            if not isinstance(table, dict):
+                raise InputError("is not a table; write its values below")
+            materials[name] = _built(Material, table, _MATERIAL_KEYS)
+    return materials
+
+
+def _objects(tables: Any, materials: Mapping[str, Material], folder: Path) -> list[Object]:
+    if not isinstance(tables, list):
+        raise InputError("objects: is one table; write [[objects]] with double brackets")
+    library = MeshLibrary(folder)
+    objects: list[Object] = []
+    numbers: dict[str, int] = {}
+    for number, table in enumerate(tables, 1):
+        label = table.get("name") if isinstance(table, dict) else None
+        shown = f" ({quoted(label)})" if isinstance(label, str) and label else ""
+        with in_place(f"[[objects]] {number}{shown}"):
+            if not isinstance(table, dict):
+                raise InputError("is not a table; write [[objects]] and its keys below")
+            for obj in _object(table, materials, library):
+                if obj.name in numbers:
+                    raise InputError(f"name: [[objects]] {numbers[obj.name]} has that name too; rename one")
+                numbers[obj.name] = number
+                objects.append(obj)
+    return objects
+
+
+def _object(table: dict[str, Any], materials: Mapping[str, Material], library: MeshLibrary) -> list[Object]:
+    """The object of a table, or several where its mesh file holds several: "name/part"."""
+    check_keys(table, _OBJECT_KEYS)
+    name = text_of(table, "name", "give every object a name of its own")
+    material = text_of(table, "material", "name one of [materials]")
+    if material not in materials:
+        close = get_close_matches(material, materials, 1)
+        hint = f"did you mean {close[0]!r}?" if close else f"add [materials.{material}]"
+        raise InputError(f"material: {material!r} is not in [materials]; {hint}")
+    placement = {k: v for k, v in table.items() if k in ("position", "rotation", "scale", "visible")}
+    meshes = library.meshes(table)
+    names = [name] if len(meshes) == 1 else [f"{name}/{part}" for part, _ in meshes]
+    return [Object(n, mesh, material, **placement) for n, (_, mesh) in zip(names, meshes, strict=True)]

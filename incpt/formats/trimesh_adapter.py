@@ -1,0 +1,159 @@
+"""Mesh files, read by trimesh and checked here.
+
+trimesh is lenient where a renderer must not be: it makes up vertex normals, keeps faces that point at no
+vertex, fills a Draco-compressed glTF with zeros, and raises whatever comes up on damaged files. Every way
+out of this module is a usable Mesh or an InputError; what had to be left out is told by an InputWarning.
+
+A mesh made in Python is stored as .npz (vertices, faces, normals): no interchange format keeps normals per
+corner without splitting vertices.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+import os
+import warnings
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import trimesh
+
+from incpt.core.errors import InputError, InputWarning
+from incpt.core.files import read_bytes
+from incpt.formats.clean import placed_mesh
+from incpt.formats.gltf import gltf_header, gltf_materials
+from incpt.formats.obj import ODD_FACE, absolute_obj, hint, utf8
+from incpt.scene.mesh import MeshSource
+from incpt.scene.mesh_part import MeshPart
+
+TRIMESH_SUFFIXES = ("glb", "gltf", "obj", "off", "ply", "stl", "3mf", "dae")
+
+
+def read_with_trimesh(path: Path, suffix: str) -> tuple[MeshPart, ...]:
+    """The parts of a mesh file that trimesh can read; see `mesh_files.load_parts`. Raises InputError."""
+    header: dict[str, Any] = {}
+    if suffix in ("glb", "gltf"):
+        header = gltf_header(path, suffix)
+    loaded, dropped = _load_obj(path) if suffix == "obj" else (_load(path, suffix), 0)
+    counts = {"in all": dropped, "with an index out of range": dropped}
+    instances = _instances(loaded)
+    materials = gltf_materials(header, list(loaded.geometry))
+    parts = []
+    for name, geometry_name, matrix in instances:
+        geometry = loaded.geometry[geometry_name]
+        mesh = placed_mesh(geometry, matrix, counts, with_normals=suffix != "stl")
+        if mesh is not None:
+            parts.append(MeshPart(name, mesh, *materials.get(geometry_name, (None, None))))
+    left_out = ", ".join(
+        f"{count} {reason}" for reason, count in counts.items() if count and reason != "in all"
+    )
+    if not parts:
+        raise InputError(f"has no usable face ({left_out or 'no faces in the file'})")
+    if left_out:
+        total = counts["in all"]
+        lost = sum(counts.values()) - total
+        warnings.warn(f"{path}: left out {lost} of {total} faces: {left_out}", InputWarning, stacklevel=4)
+    single = len(instances) == 1
+    source = MeshSource(file=os.path.abspath(path))
+    return tuple(
+        replace(
+            p,
+            name=None if single else p.name,
+            mesh=replace(p.mesh, source=source if single else replace(source, part=p.name)),
+        )
+        for p in parts
+    )
+
+
+@contextmanager
+def _quiet() -> Iterator[list[str]]:
+    """Collects what trimesh logs and drops what it and numpy warn about: the error names the problem."""
+    messages: list[str] = []
+
+    class Collect(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            messages.append(record.getMessage())
+
+    log = logging.getLogger("trimesh")
+    handler, propagate = Collect(logging.WARNING), log.propagate
+    log.addHandler(handler)
+    log.propagate = False
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            yield messages
+    finally:
+        log.propagate = propagate
+        log.removeHandler(handler)
+
+
+def _load(path: Path, suffix: str, content: bytes | None = None) -> trimesh.Scene:
+    options: dict[str, Any] = {"process": False}
+    if suffix in ("obj", "ply", "glb", "gltf"):
+        options["skip_materials"] = True  # textures are not used: no file but this one is opened
+    if suffix == "obj":
+        options |= {"split_objects": True, "group_material": False}
+    try:
+        with _quiet() as messages:
+            stream: Any = str(path) if content is None else io.BytesIO(content)
+            loaded = trimesh.load_scene(stream, file_type=suffix, **options)
+    except Exception as error:  # any type at all on a damaged file; see the module's docstring
+        raise InputError(f"is no {suffix.upper()} mesh, or a damaged one ({hint(error)})") from None
+    if any("placeholder zeros" in message for message in messages):
+        raise InputError("is compressed in a way that cannot be decoded; export it uncompressed")
+    return loaded
+
+
+def _load_obj(path: Path) -> tuple[trimesh.Scene, int]:
+    """An OBJ file, and how many faces were left out for a vertex index that is out of range.
+
+    trimesh counts relative indices from the end of the file and fails altogether on one out of range:
+    such files are rewritten for it.
+    """
+    content = utf8(read_bytes(path))
+    if not ODD_FACE.search(content):
+        try:
+            return _load(path, "obj", content), 0
+        except InputError:
+            pass
+    try:
+        content, left_out = absolute_obj(content)
+    except ValueError as error:
+        raise InputError(f"is no OBJ mesh, or a damaged one ({hint(error)})") from None
+    return _load(path, "obj", content), left_out
+
+
+def _instances(loaded: trimesh.Scene) -> list[tuple[str, str, npt.NDArray[np.float64]]]:
+    """(name, name of the geometry, (4, 4) placement) of every placed triangle mesh.
+
+    Ordered by geometry, then by name. A glTF node with several primitives gets random frame names from
+    trimesh: its parts are numbered instead, so that they are the same the next time.
+    """
+    order = {name: index for index, name in enumerate(loaded.geometry)}
+    parents = {child: parent for parent, child, _ in loaded.graph.to_edgelist()}  # type: ignore[no-untyped-call]
+    found = []
+    for node in loaded.graph.nodes_geometry:
+        matrix, geometry_name = loaded.graph.get(node)
+        mesh = loaded.geometry.get(geometry_name)
+        if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
+            numbered = mesh.metadata.get("from_gltf_primitive") is True
+            name = str(parents[node] if numbered else node)
+            found.append((order[geometry_name], name, str(geometry_name), matrix))
+    uses = Counter(name for _, name, _, _ in found)
+    used: set[str] = set()
+    result: list[tuple[str, str, npt.NDArray[np.float64]]] = []
+    for _, name, geometry, matrix in sorted(found, key=lambda item: item[:2]):
+        unique, number = (f"{name}.1", 1) if uses[name] > 1 else (name or "part", 1)
+        while unique in used:
+            number += 1
+            unique = f"{name or 'part'}.{number}"
+        used.add(unique)
+        result.append((unique, geometry, np.asarray(matrix, np.float64)))
+    return result

@@ -1,0 +1,85 @@
+"""From linear radiance to what a display shows.
+
+The display curve "agx" is AgX by Troy Sobotka in the polynomial form of Benjamin Wrensch ("Minimal AgX
+Implementation", iolite-engine.com, 2023), the default look of Blender 4: bright colours run into white
+instead of clipping to a primary, and greys stay grey. "filmic" is the curve of John Hable ("Filmic
+Tonemapping Operators", filmicgames.com, 2010) for each channel alone: more contrast, saturated highlights.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from incpt.core.errors import InputError
+
+CURVES = ("agx", "filmic", "srgb")
+AGX_INSET = np.array(
+    [
+        [0.842479062253094, 0.0784335999999992, 0.0792237451477643],
+        [0.0423282422610123, 0.878468636469772, 0.0791661274605434],
+        [0.0423756549057051, 0.0784336, 0.879142973793104],
+    ]
+)
+AGX_INSET /= AGX_INSET.sum(axis=1, keepdims=True)  # printed digits sum to 1.0001: greys took a tint
+AGX_OUTSET = np.linalg.inv(AGX_INSET)
+AGX_LOG2_RANGE = (-12.47393, 4.026069)
+
+
+# Of x^6 down to 1; Wrensch's fit, mean squared error 3.7e-6.
+AGX_POLYNOMIAL = (15.5, -40.14, 31.96, -6.868, 0.4298, 0.1191, -0.00232)
+
+
+# Hable's shoulder strength, linear strength and angle, toe strength, numerator and denominator.
+HABLE_CURVE = (0.15, 0.50, 0.10, 0.20, 0.02, 0.30)
+HABLE_WHITE = 11.2
+HABLE_EXPOSURE_BIAS = 2.0
+UNDEFINED_PIXEL = (255, 0, 255)
+
+
+def tone_map(linear: npt.ArrayLike, exposure: float = 0.0, curve: str = "agx") -> npt.NDArray[np.uint8]:
+    """(..., 3) linear radiance to display values 0 to 255, sRGB encoded.
+
+    `exposure` is in stops. `curve` is "agx" (greys stay neutral, mid-grey 0.18 becomes 127, white
+    1.0 becomes 201, what is brighter has room), "filmic" (0.18 becomes 100, 1.0 becomes 186, 5.6 and more
+    255) or "srgb" (the plain transfer function, clipped at 1).
+    Infinite radiance becomes white; undefined pixels (NaN) become magenta, so that they are seen.
+    Raises InputError.
+    """
+    if curve not in CURVES:
+        raise InputError(f"curve: {curve!r} is not known; choose one of {', '.join(CURVES)}")
+    radiance = np.asarray(linear, np.float64)
+    if radiance.shape[-1:] != (3,):
+        raise InputError(f"image: has shape {radiance.shape}; a picture has shape (height, width, 3)")
+    undefined = np.isnan(radiance).any(axis=-1)
+    scaled = np.clip(np.nan_to_num(radiance, posinf=1e30, neginf=0.0) * 2.0**exposure, 0.0, 1e30)
+    encoded = {"agx": _agx, "filmic": _filmic, "srgb": _srgb}[curve](scaled)
+    result: npt.NDArray[np.uint8] = np.rint(np.clip(encoded, 0.0, 1.0) * 255.0).astype(np.uint8)
+    result[undefined] = UNDEFINED_PIXEL
+    return result
+
+
+def _srgb(linear: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """IEC 61966-2-1."""
+    x = np.minimum(linear, 1.0)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+
+
+def _agx(linear: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    low, high = AGX_LOG2_RANGE
+    inset = np.maximum(linear @ AGX_INSET.T, 1e-10)
+    x = np.clip((np.log2(inset) - low) / (high - low), 0.0, 1.0)
+    result: npt.NDArray[np.float64] = np.polyval(AGX_POLYNOMIAL, x) @ AGX_OUTSET.T
+    return result
+
+
+def _filmic(linear: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    a, b, c, d, e, f = HABLE_CURVE
+
+    def curve(x: npt.NDArray[np.float64] | float) -> npt.NDArray[np.float64]:
+        mapped: npt.NDArray[np.float64] = np.asarray(
+            (x * (a * x + c * b) + d * e) / (x * (a * x + b) + d * f) - e / f
+        )
+        return mapped
+
+    return _srgb(curve(np.minimum(linear * HABLE_EXPOSURE_BIAS, HABLE_WHITE)) / curve(HABLE_WHITE))

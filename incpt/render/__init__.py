@@ -1,0 +1,1 @@
+"""Rendering a scene step by step: plan, paths, film, strategies, session."""

@@ -1,0 +1,1 @@
+"""Edit sessions without a window, with the error after each edit."""

@@ -1,0 +1,137 @@
+"""The difference between two scenes, and the objects that look different after it.
+
+Parts of a scene that did not change are shared by the new one, so comparing by identity first makes `diff`
+cheap. Nobody sets a flag, so no edit can be forgotten.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import compress, count
+from operator import is_not
+
+from incpt.scene.mesh import is_deformation
+from incpt.scene.model import Object, Scene
+
+
+@dataclass(frozen=True)
+class Change:
+    """What differs between two scenes. Names of objects and materials; flags for what there is one of.
+
+    moved        objects with another transform (or shown, or hidden)
+    deformed     objects whose mesh has other vertices or normals but the same faces
+    reshaped     objects with another mesh
+    reassigned   objects with another material
+    """
+
+    camera: bool = False
+    environment: bool = False
+    environment_image: bool = False
+    materials: frozenset[str] = frozenset()
+    materials_added_or_removed: bool = False
+    added: frozenset[str] = frozenset()
+    removed: frozenset[str] = frozenset()
+    reordered: bool = False
+    moved: frozenset[str] = frozenset()
+    deformed: frozenset[str] = frozenset()
+    reshaped: frozenset[str] = frozenset()
+    reassigned: frozenset[str] = frozenset()
+
+    @property
+    def is_global(self) -> bool:
+        """Whether the whole image is affected alike: camera or environment."""
+        return self.camera or self.environment or self.environment_image
+
+    @property
+    def is_local(self) -> bool:
+        """Whether something in the scene changed that affects a part of the image most."""
+        return bool(self.materials or self.objects)
+
+    @property
+    def objects(self) -> frozenset[str]:
+        """Every object that changed, came or went."""
+        return self.added | self.removed | self.moved | self.deformed | self.reshaped | self.reassigned
+
+
+def diff(old: Scene, new: Scene) -> Change:
+    """What changed from `old` to `new`. Unused materials count too: an object may use them next."""
+    before, after = (
+        {o.name: o for o in objects} for objects in _without_equal_ends(old.objects, new.objects)
+    )
+    common = [name for name in after if name in before and after[name] is not before[name]]
+    pairs = [(name, before[name], after[name]) for name in common]
+    old_image, new_image = old.environment.image, new.environment.image
+    return Change(
+        camera=old.camera != new.camera,
+        environment=old.environment != new.environment,
+        environment_image=old_image is not new_image,
+        materials=frozenset(
+            name
+            for name in old.materials.keys() & new.materials.keys()
+            if old.materials[name] != new.materials[name]
+        ),
+        materials_added_or_removed=list(old.materials) != list(new.materials),
+        added=frozenset(after.keys() - before.keys()),
+        removed=frozenset(before.keys() - after.keys()),
+        reordered=[n for n in before if n in after] != [n for n in after if n in before],
+        moved=frozenset(
+            name
+            for name, a, b in pairs
+            if (a.position, a.rotation, a.scale, a.visible) != (b.position, b.rotation, b.scale, b.visible)
+        ),
+        deformed=frozenset(
+            name for name, a, b in pairs if a.mesh is not b.mesh and is_deformation(a.mesh, b.mesh)
+        ),
+        reshaped=frozenset(
+            name for name, a, b in pairs if a.mesh is not b.mesh and not is_deformation(a.mesh, b.mesh)
+        ),
+        reassigned=frozenset(name for name, a, b in pairs if a.material != b.material),
+    )
+
+
+def _without_equal_ends(
+    old: tuple[Object, ...], new: tuple[Object, ...]
+) -> tuple[tuple[Object, ...], tuple[Object, ...]]:
+    """Both without the objects that are the same from the first on and from the last on: nearly all."""
+
+    def same(a: Iterable[Object], b: Iterable[Object], most: int) -> int:
+        return next(compress(count(), map(is_not, a, b)), most)
+
+    most = min(len(old), len(new))
+    first = same(old, new, most)
+    last = min(same(reversed(old), reversed(new), most), most - first)
+    return old[first : len(old) - last], new[first : len(new) - last]
+
+
+def affected_objects(old: Scene, new: Scene, change: Change) -> list[Object]:
+    """The objects that look different, as they were and as they are; hidden ones do not count, nor does one
+    that is there as before under another name, its own or its material's."""
+    gone = _touched(old, change.objects - change.added, change.materials)
+    come = _touched(new, change.objects - change.removed, change.materials)
+    same = Counter(_look(old, o) for o in gone) & Counter(_look(new, o) for o in come)
+    return [*_without(old, gone, same), *_without(new, come, same)]
+
+
+def _touched(scene: Scene, names: frozenset[str], materials: frozenset[str]) -> list[Object]:
+    if not materials:  # one among thousands
+        chosen = (scene.objects[i] for i in sorted(scene.object_index[name] for name in names))
+        return [obj for obj in chosen if obj.visible]
+    return [o for o in scene.objects if o.visible and (o.name in names or o.material in materials)]
+
+
+def _look(scene: Scene, obj: Object) -> tuple[object, ...]:
+    # A mesh is itself only, see Mesh.
+    return id(obj.mesh), obj.position, obj.rotation, obj.scale, scene.materials[obj.material]
+
+
+def _without(scene: Scene, objects: list[Object], same: Counter[tuple[object, ...]]) -> list[Object]:
+    left, found = same.copy(), []
+    for obj in objects:
+        look = _look(scene, obj)
+        if left[look] > 0:
+            left[look] -= 1
+        else:
+            found.append(obj)
+    return found

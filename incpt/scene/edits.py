@@ -1,0 +1,277 @@
+"""Edits of objects and materials: functions from a Scene to another one.
+
+Those that make objects also return the names of the new ones, to be selected. What they refuse they raise
+as InputError and leave the scene as it was, which an immutable one does by itself.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from incpt.core import transform
+from incpt.core.errors import InputError
+from incpt.core.transform import Vector
+from incpt.scene.checks import LARGEST
+from incpt.scene.material import Material
+from incpt.scene.mesh_part import MeshPart
+from incpt.scene.model import SMALLEST_SCALE, Object, Scene
+from incpt.scene.shapes import shape
+
+Names = tuple[str, ...]
+
+DEFAULT_MATERIAL = "grey"
+"""What new objects are made of where nothing else is said; made when it is not there."""
+_SAME_ROTATION_DEG = 1e-4
+_RIGID = 1e-5
+"""What a gizmo's float32 matrices leave of equality: below it nothing was turned, or scaled."""
+
+
+# ------------------------------------------------------------------------------------------ new objects
+
+
+def floor_point(scene: Scene) -> Vector:
+    """Where new things stand: below the camera's target on the floor y = 0, or at the target itself where
+    that is lower."""
+    x, y, z = scene.camera.target
+    return x, min(y, 0.0), z
+
+
+def add_shape(
+    scene: Scene, name: str, at: Vector | None = None, material: str | None = None
+) -> tuple[Scene, Names]:
+    """The scene with a built-in shape that stands on `at` (`floor_point` if None); the new name.
+
+    `material` None: the one called "grey", made if there is none. Raises InputError.
+    """
+    mesh = shape(name)
+    scene, material = _with_material_for_new(scene, material)
+    position = _standing_on(at or floor_point(scene), mesh.bounds)
+    new = Object(unique_name(name, scene.object_index), mesh, material, position)
+    return scene.with_added(new), (new.name,)
+
+
+def add_parts(
+    scene: Scene, parts: Sequence[MeshPart], label: str, at: Vector | None = None, material: str | None = None
+) -> tuple[Scene, Names]:
+    """The scene with the meshes of a file, in its own units and arrangement, their box standing on `at`
+    (`floor_point` if None); the new names, which begin with `label`.
+
+    Materials that the file brings come along, under another name where the scene has a different one of
+    that name; meshes without one get `material` as in `add_shape`. Raises InputError.
+    """
+    boxes = np.stack([part.mesh.bounds for part in parts])
+    bounds = np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+    position = _standing_on(at or floor_point(scene), bounds)
+    names: list[str] = []
+    brought: dict[str, str] = {}
+    for part in parts:
+        if part.material is None or part.material_name is None:
+            scene, used = _with_material_for_new(scene, material)
+        else:
+            if part.material_name not in brought:
+                scene, brought[part.material_name] = _with_brought(scene, part.material_name, part.material)
+            used = brought[part.material_name]
+        wanted = label if part.name is None else f"{label}/{part.name}"
+        name = unique_name(wanted or "mesh", scene.object_index)
+        scene = scene.with_added(Object(name, part.mesh, used, position))
+        names.append(name)
+    return scene, tuple(names)
+
+
+# ---------------------------------------------------------------------------------------------- objects
+
+
+def duplicate(scene: Scene, names: Iterable[str]) -> tuple[Scene, Names]:
+    """The scene with a copy of every named object in its place, with the same mesh and material; the names
+    of the copies."""
+    copies: list[str] = []
+    for name in names:
+        copy = unique_name(name, scene.object_index)
+        scene = scene.with_added(replace(scene.object(name), name=copy))
+        copies.append(copy)
+    return scene, tuple(copies)
+
+
+def delete(scene: Scene, names: Iterable[str]) -> Scene:
+    """The scene without those objects. Raises InputError."""
+    for name in names:
+        scene = scene.without_object(name)
+    return scene
+
+
+def rename(scene: Scene, old: str, new: str) -> Scene:
+    """The scene with one object called otherwise, in its place. Raises InputError: a name that is empty or
+    taken."""
+    new = _checked_name(new, old, scene.object_index, "object")
+    return scene if new == old else scene.with_object(old, name=new)
+
+
+def set_visible(scene: Scene, names: Iterable[str], visible: bool) -> Scene:
+    """The scene with those objects shown or hidden. Raises InputError."""
+    return _with_each(scene, names, {"visible": visible})
+
+
+def assign_material(scene: Scene, names: Iterable[str], material: str) -> Scene:
+    """The scene with those objects made of another material. Raises InputError."""
+    scene.material(material)
+    return _with_each(scene, names, {"material": material})
+
+
+def bounds_of(scene: Scene, names: Collection[str] = ()) -> npt.NDArray[np.float64] | None:
+    """(2, 3) bounds in world space of the named objects, or of all that are shown; None without any.
+
+    Raises InputError for a name that is not in the scene.
+    """
+    chosen = [scene.object(name) for name in names] or [o for o in scene.objects if o.visible]
+    if not chosen:
+        return None
+    boxes = np.stack([obj.world_bounds for obj in chosen])
+    return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+
+def transform_objects(
+    scene: Scene,
+    names: Iterable[str],
+    delta: npt.ArrayLike,
+    pivot: Sequence[float] = (0.0, 0.0, 0.0),
+) -> Scene:
+    """The scene with those objects moved by a (4, 4) affine matrix in world space about a point.
+
+    Give the scene from before the drag and the whole movement since then, so that rounding does not add up.
+    Rotations stay near what they were and scales keep their signs; what is not turned keeps its angles and
+    what is not scaled its scale, to the bit. Shear, which a scaled group of turned objects would get, is
+    dropped (`transform.decompose`). Numbers out of the scene's range are brought back into it, and an
+    object that would be flattened stays as it was. Raises InputError for unknown names.
+    """
+    matrix = np.asarray(delta, np.float64)
+    about = np.asarray(pivot, np.float64)
+    changed = {}
+    for name in dict.fromkeys(names):
+        obj = scene.object(name)
+        world = obj.world_from_object
+        linear = matrix[:3, :3] @ world[:, :3]
+        position = matrix[:3, :3] @ (world[:, 3] - about) + about + matrix[:3, 3]
+        changed[name] = _placed(obj, np.column_stack([linear, position]), matrix[:3, :3])
+    return replace(scene, objects=tuple(changed.get(o.name, o) for o in scene.objects))
+
+
+# -------------------------------------------------------------------------------------------- materials
+
+
+def add_material(scene: Scene, name: str = "material", material: Material | None = None) -> tuple[Scene, str]:
+    """The scene with another material, and its name: `name`, or with a number where that is taken."""
+    name = unique_name(name, scene.materials)
+    return replace(scene, materials={**scene.materials, name: material or Material(roughness=0.6)}), name
+
+
+def duplicate_material(scene: Scene, name: str) -> tuple[Scene, str]:
+    """The scene with a copy of a material, and the copy's name. Raises InputError."""
+    return add_material(scene, name, scene.material(name))
+
+
+def delete_material(scene: Scene, name: str) -> Scene:
+    """The scene without a material. Raises InputError while objects use it, with their names."""
+    scene.material(name)
+    users = [o.name for o in scene.objects if o.material == name]
+    if users:
+        listed = ", ".join(users[:5]) + (f" and {len(users) - 5} more" if len(users) > 5 else "")
+        raise InputError(f"material {name!r}: is used by {listed}; give them another one first")
+    return replace(scene, materials={n: m for n, m in scene.materials.items() if n != name})
+
+
+def rename_material(scene: Scene, old: str, new: str) -> Scene:
+    """The scene with a material called otherwise, in its place and at all objects. Raises InputError: a
+    name that is empty or taken."""
+    scene.material(old)
+    new = _checked_name(new, old, scene.materials, "material")
+    if new == old:
+        return scene
+    return replace(
+        scene,
+        materials={new if n == old else n: m for n, m in scene.materials.items()},
+        objects=tuple(replace(o, material=new) if o.material == old else o for o in scene.objects),
+    )
+
+
+def unique_name(name: str, taken: Collection[str]) -> str:
+    """`name` if it is free, else its stem with the first free number: "cube", "cube.001", "cube.002"."""
+    if name not in taken:
+        return name
+    stem = re.sub(r"\.\d{3,}$", "", name) or name
+    number = 1
+    while f"{stem}.{number:03d}" in taken:
+        number += 1
+    return f"{stem}.{number:03d}"
+
+
+def _checked_name(new: str, old: str, taken: Collection[str], what: str) -> str:
+    new = " ".join(new.split())
+    if not new:
+        raise InputError(f"{what} {old!r}: a name cannot be empty; give it a text")
+    if new != old and new in taken:
+        raise InputError(f"{what} {old!r}: {new!r} is taken by another {what}; choose another name")
+    return new
+
+
+def _with_each(scene: Scene, names: Iterable[str], changes: Mapping[str, Any]) -> Scene:
+    for name in names:
+        obj = scene.object(name)
+        if any(getattr(obj, key) != value for key, value in changes.items()):
+            scene = scene.with_object(name, **changes)
+    return scene
+
+
+def _with_material_for_new(scene: Scene, material: str | None) -> tuple[Scene, str]:
+    if material is not None:
+        scene.material(material)
+        return scene, material
+    if DEFAULT_MATERIAL in scene.materials:
+        return scene, DEFAULT_MATERIAL
+    return add_material(scene, DEFAULT_MATERIAL)
+
+
+def _with_brought(scene: Scene, name: str, material: Material) -> tuple[Scene, str]:
+    for known, other in scene.materials.items():
+        if other == material and re.fullmatch(re.escape(name) + r"(\.\d{3,})?", known):
+            return scene, known
+    return add_material(scene, name, material)
+
+
+def _standing_on(at: Sequence[float], bounds: npt.NDArray[np.floating[Any]]) -> Vector:
+    """The position at which a box stands with the middle of its bottom on a point."""
+    low, high = np.asarray(bounds, np.float64)
+    x, y, z = (float(v) for v in np.asarray(at) - [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+    return x, y, z
+
+
+def _placed(obj: Object, world: npt.NDArray[np.float64], turn: npt.NDArray[np.float64]) -> Object:
+    """An object under another matrix, which `turn` (3, 3) made of its own."""
+    position = _within(world[:, 3])
+    if np.abs(turn - np.eye(3)).max() < _RIGID:
+        return replace(obj, position=position)
+    try:
+        _, rotation, scale = transform.decompose(world, obj.rotation, obj.scale)
+    except np.linalg.LinAlgError:
+        return obj
+    is_turned_only = np.abs(turn @ turn.T - np.eye(3)).max() < _RIGID and np.linalg.det(turn) > 0
+    is_scaled_only = np.abs(np.subtract(rotation, obj.rotation)).max() < _SAME_ROTATION_DEG
+    return replace(
+        obj,
+        position=position,
+        rotation=obj.rotation if is_scaled_only else rotation,
+        scale=obj.scale if is_turned_only else _within(scale, SMALLEST_SCALE),
+    )
+
+
+def _within(values: Sequence[float] | npt.NDArray[np.float64], smallest: float = 0.0) -> Vector:
+    """Three numbers brought into the range that a scene allows."""
+    numbers = np.asarray(values, np.float64)
+    sizes = np.clip(np.abs(numbers), smallest, LARGEST)
+    x, y, z = (float(v) for v in np.copysign(sizes, numbers))
+    return x, y, z

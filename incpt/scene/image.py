@@ -1,0 +1,36 @@
+"""Images as values: the pixels, and the file that they came from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from incpt.core.errors import InputError
+from incpt.core.layout import ENVIRONMENT_MAX_SIZE
+from incpt.scene.checks import read_only
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """A lat-long radiance image: `pixels` (H, W, 3) float32, linear; `source` is the file it came from.
+
+    OpenEXR's convention: the centre looks to +z, three quarters to the right is -x, the top row is +y.
+    """
+
+    pixels: npt.NDArray[np.float32]
+    source: str | None = None
+
+    def __post_init__(self) -> None:
+        pixels = np.ascontiguousarray(self.pixels, np.float32)
+        if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.size == 0:
+            raise InputError(f"image: has shape {pixels.shape}; an environment has shape (height, width, 3)")
+        if max(pixels.shape[:2]) > ENVIRONMENT_MAX_SIZE:
+            raise InputError(
+                f"image: {pixels.shape[1]} x {pixels.shape[0]} pixels are more than "
+                f"{ENVIRONMENT_MAX_SIZE} a side; scale it down"
+            )
+        if not np.isfinite(pixels).all() or pixels.min() < 0:
+            raise InputError("image: holds negative, infinite or undefined radiance; repair the file")
+        object.__setattr__(self, "pixels", read_only(pixels))

@@ -1,0 +1,166 @@
+"""The immutable scene, and the difference between two of them.
+
+An edit makes a new Scene that shares whatever did not change, so comparing parts by identity first
+makes `diff` cheap, undo is a list of scenes, and nobody has to set a flag that could be forgotten.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from incpt.core import transform
+from incpt.core.errors import InputError
+from incpt.core.layout import MEDIUM_NONE
+from incpt.core.settings import RenderSettings
+from incpt.core.transform import Vector
+from incpt.scene.camera import Camera
+from incpt.scene.checks import set_vector
+from incpt.scene.environment import Environment
+from incpt.scene.material import Material
+from incpt.scene.mesh import Mesh
+
+SMALLEST_SCALE = 1e-6
+
+
+@dataclass(frozen=True)
+class Object:
+    """An instance of a mesh: material by name; position in metres, rotation in degrees (about x, then y,
+    then z: R = Rz · Ry · Rx), scale by axis."""
+
+    name: str
+    mesh: Mesh
+    material: str
+    position: Vector = (0.0, 0.0, 0.0)
+    rotation: Vector = (0.0, 0.0, 0.0)
+    scale: Vector = (1.0, 1.0, 1.0)
+    visible: bool = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise InputError(f"name: {self.name!r} is not a name; give the object a text")
+        if not isinstance(self.mesh, Mesh):
+            raise InputError(f"mesh: {self.mesh!r} is not a Mesh; use shape() or load_mesh()")
+        if not isinstance(self.material, str):
+            raise InputError(f"material: {self.material!r} is not the name of a material")
+        if not isinstance(self.visible, bool):
+            raise InputError(f"visible: {self.visible!r} is not true or false")
+        for name in ("position", "rotation", "scale"):
+            set_vector(self, name)
+        if min(abs(s) for s in self.scale) < SMALLEST_SCALE:
+            raise InputError(
+                f"scale: {list(self.scale)} flattens the object; use at least {SMALLEST_SCALE:g}"
+            )
+
+    @cached_property
+    def world_from_object(self) -> npt.NDArray[np.float64]:
+        """(3, 4) affine matrix."""
+        return transform.world_from_object(self.position, self.rotation, self.scale)
+
+    @cached_property
+    def world_bounds(self) -> npt.NDArray[np.float64]:
+        """(2, 3) bounds of the corners of the mesh's box, in world space."""
+        corners = transform.apply_affine(self.world_from_object, transform.box_corners(self.mesh.bounds))
+        return np.stack([corners.min(axis=0), corners.max(axis=0)])
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything that is seen. `settings` is the scene's own proposal of how to render it."""
+
+    camera: Camera = field(default_factory=Camera)
+    environment: Environment = field(default_factory=Environment)
+    materials: Mapping[str, Material] = field(default_factory=dict)
+    objects: tuple[Object, ...] = ()
+    settings: RenderSettings = RenderSettings()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "materials", MappingProxyType(dict(self.materials)))
+        object.__setattr__(self, "objects", tuple(self.objects))
+        if len(self.materials) >= MEDIUM_NONE:
+            raise InputError(f"materials: {len(self.materials)} are more than {MEDIUM_NONE - 1}; merge some")
+        seen: set[str] = set()
+        for obj in self.objects:
+            if obj.name in seen:
+                raise InputError(f"objects: two are named {obj.name!r}; rename one of them")
+            seen.add(obj.name)
+            if obj.material not in self.materials:
+                raise InputError(
+                    f"object {obj.name!r}: material {obj.material!r} is not in the scene; "
+                    f"{_known(self.materials)}"
+                )
+
+    @cached_property
+    def object_index(self) -> Mapping[str, int]:
+        """Place of each object in `objects`, by name."""
+        return {obj.name: i for i, obj in enumerate(self.objects)}
+
+    def object(self, name: str) -> Object:
+        """The object of that name. Raises InputError."""
+        if name not in self.object_index:
+            raise InputError(f"object {name!r} is not in the scene; {_known(self.object_index)}")
+        return self.objects[self.object_index[name]]
+
+    def material(self, name: str) -> Material:
+        """The material of that name. Raises InputError."""
+        if name not in self.materials:
+            raise InputError(f"material {name!r} is not in the scene; {_known(self.materials)}")
+        return self.materials[name]
+
+    def with_camera(self, **changes: Any) -> Scene:
+        """A scene whose camera has other values: position, target, up, fov_y."""
+        return replace(self, camera=_replace(self.camera, changes))
+
+    def with_environment(self, **changes: Any) -> Scene:
+        """A scene whose environment has other values: color, image, rotation_y, intensity."""
+        return replace(self, environment=_replace(self.environment, changes))
+
+    def with_material(self, name: str, /, **changes: Any) -> Scene:
+        """A scene with a changed material, or with a new one of that name."""
+        material = _replace(self.materials.get(name, Material()), changes)
+        return replace(self, materials={**self.materials, name: material})
+
+    def with_object(self, name: str, /, **changes: Any) -> Scene:
+        """A scene with one object changed: mesh, material, position, rotation, scale, visible, name."""
+        changed = _replace(self.object(name), changes)
+        return replace(self, objects=tuple(changed if o.name == name else o for o in self.objects))
+
+    def with_added(self, *objects: Object) -> Scene:
+        """A scene with more objects."""
+        return replace(self, objects=(*self.objects, *objects))
+
+    def without_object(self, name: str) -> Scene:
+        """A scene without that object."""
+        self.object(name)
+        return replace(self, objects=tuple(o for o in self.objects if o.name != name))
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A mappingproxy cannot be pickled or deep-copied.
+        return {
+            **{k: v for k, v in self.__dict__.items() if k != "object_index"},
+            "materials": dict(self.materials),
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state, materials=MappingProxyType(state["materials"]))
+
+
+def _known(names: Iterable[str]) -> str:
+    listed = sorted(names)
+    if not listed:
+        return "it has none"
+    return "it has " + ", ".join(listed[:8]) + (f" and {len(listed) - 8} more" if len(listed) > 8 else "")
+
+
+def _replace(value: Any, changes: Mapping[str, Any]) -> Any:
+    for key in changes:
+        if key not in value.__dataclass_fields__:
+            known = ", ".join(value.__dataclass_fields__)
+            raise InputError(f"{key}: is no property of {type(value).__name__.lower()}; it has {known}")
+    return replace(value, **changes)

@@ -1,0 +1,65 @@
+"""What is in a scene, as lines of text, and what makes its picture empty or black."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection
+
+import numpy as np
+
+from incpt.scene.environment import Environment
+from incpt.scene.model import Scene
+
+
+def scene_problems(scene: Scene) -> list[str]:
+    """What makes the picture of a valid scene empty or black, a line each."""
+    problems = []
+    if not scene.objects:
+        problems.append("the scene has no objects: the picture shows the environment only")
+    lit = any(c > 0 for c in scene.environment.radiance) and (
+        scene.environment.image is None or bool(scene.environment.image.pixels.any())
+    )
+    if not lit and not any(o.visible and scene.materials[o.material].is_emissive for o in scene.objects):
+        problems.append(
+            "the scene has no light: the picture will be black; add an environment or an emissive material"
+        )
+    return problems
+
+
+def describe(scene: Scene) -> list[str]:
+    """What is in a scene, as lines of text: counts, bounds, lights, problems."""
+    meshes = {id(o.mesh): o.mesh for o in scene.objects}
+    lights = [o for o in scene.objects if o.visible and scene.materials[o.material].is_emissive]
+    hidden = sum(not o.visible for o in scene.objects)
+    placed = sum(len(o.mesh.faces) for o in scene.objects)
+    stored = sum(len(mesh.faces) for mesh in meshes.values())
+    lines = [
+        f"objects: {len(scene.objects):,}" + (f" ({hidden:,} hidden)" if hidden else ""),
+        f"meshes: {len(meshes):,} with {stored:,} triangles; {placed:,} triangles placed",
+        f"materials: {len(scene.materials):,}",
+        f"lights: {len(lights):,} emissive objects with {sum(len(o.mesh.faces) for o in lights):,} triangles",
+        f"environment: {_described_environment(scene.environment)}",
+    ]
+    if scene.objects:
+        bounds = np.stack([o.world_bounds for o in scene.objects])
+        low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
+        lines.append(f"bounds: {_described_point(low)} to {_described_point(high)} metres")
+    camera = scene.camera
+    lines.append(
+        f"camera: at {_described_point(camera.position)}, looks at {_described_point(camera.target)}, "
+        f"{camera.fov_y:g} degrees high"
+    )
+    return lines + [f"warning: {problem}" for problem in scene_problems(scene)]
+
+
+def _described_environment(environment: Environment) -> str:
+    colour = f"radiance {_described_point(environment.radiance)}"
+    if environment.image is None:
+        return colour if any(environment.radiance) else "none"
+    height, width = environment.image.pixels.shape[:2]
+    name = os.path.basename(environment.image.source or "made in Python")
+    return f"{colour} times {name}, {width} x {height} pixels"
+
+
+def _described_point(point: Collection[float]) -> str:
+    return "(" + ", ".join(f"{x:.4g}" for x in point) + ")"

@@ -1,0 +1,1 @@
+"""A scene as the kernels read it: geometry, objects, materials, lights, environment."""

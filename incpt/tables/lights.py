@@ -1,0 +1,150 @@
+"""Tables for light sampling: emissive triangles chosen by power, and the environment by luminance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from incpt.core import layout, transform
+from incpt.scene.image import Image
+from incpt.scene.material import Material
+from incpt.scene.model import Scene
+
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def luminance(color: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Rec. 709 luminance of linear colours (..., 3)."""
+    return np.asarray(np.asarray(color, np.float64) @ _LUMINANCE)
+
+
+def radiant_weight(material: Material) -> float:
+    """Power per area that counts in choosing lights: luminance, twice where both sides shine."""
+    return float(luminance(material.emission)) * (2.0 if material.double_sided else 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleLights:
+    """`planes` (len(LightPlane), N) float32, uints bit for bit; `total` is the sum of area times
+    `radiant_weight`."""
+
+    planes: npt.NDArray[np.float32]
+    total: float
+
+    @property
+    def count(self) -> int:
+        return int(self.planes.shape[1])
+
+
+def triangle_lights(scene: Scene, share: float) -> TriangleLights:
+    """Every visible emissive triangle that has an area. `share` is the chance that light sampling turns to
+    triangles at all; the densities contain it."""
+    corners, emission, weights, double_sided = [], [], [], []
+    radiant = {name: radiant_weight(material) for name, material in scene.materials.items()}
+    for obj in scene.objects:
+        if not obj.visible or radiant[obj.material] == 0:
+            continue
+        material = scene.materials[obj.material]
+        # A mirrored face keeps its outside: two corners change places to keep it on the normal's side.
+        mirrored = np.linalg.det(obj.world_from_object[:, :3]) < 0
+        faces = obj.mesh.faces[:, [0, 2, 1]] if mirrored else obj.mesh.faces
+        corners.append(transform.apply_affine(obj.world_from_object, obj.mesh.vertices)[faces])
+        emission.append(np.broadcast_to(material.emission, (len(faces), 3)))
+        weights.append(np.full(len(faces), radiant[obj.material]))
+        double_sided.append(np.full(len(faces), material.double_sided))
+    if not corners:
+        return TriangleLights(np.zeros((len(layout.LightPlane), 0), np.float32), 0.0)
+    return _triangle_planes(
+        np.concatenate(corners),
+        np.concatenate(emission),
+        np.concatenate(weights),
+        np.concatenate(double_sided),
+        share,
+    )
+
+
+def _triangle_planes(
+    corners: npt.NDArray[np.float64],
+    emission: npt.NDArray[np.float64],
+    weights: npt.NDArray[np.float64],
+    double_sided: npt.NDArray[np.bool_],
+    share: float,
+) -> TriangleLights:
+    edge_1, edge_2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    power = weights * np.linalg.norm(np.cross(edge_1, edge_2), axis=1) / 2
+    kept = power > 0
+    total = float(power[kept].sum())
+    planes = np.zeros((len(layout.LightPlane), int(kept.sum())), np.float32)
+    if total > 0:
+        plane = layout.LightPlane
+        planes[plane.VERTEX_X : plane.VERTEX_Z + 1] = corners[kept, 0].T
+        planes[plane.EDGE_1_X : plane.EDGE_1_Z + 1] = edge_1[kept].T
+        planes[plane.EDGE_2_X : plane.EDGE_2_Z + 1] = edge_2[kept].T
+        planes[plane.EMISSION_R : plane.EMISSION_B + 1] = emission[kept].T
+        planes[plane.PDF_AREA] = weights[kept] * (share / total)
+        planes[plane.ALIAS_PROBABILITY], alias = alias_table(power[kept])
+        planes[plane.ALIAS] = alias.view(np.float32)
+        planes[plane.DOUBLE_SIDED] = double_sided[kept].astype(np.uint32).view(np.float32)
+    return TriangleLights(planes, total)
+
+
+def alias_table(
+    weights: npt.NDArray[np.floating],
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.uint32]]:
+    """Walker's alias table by Vose's method (1991): cell i stands for i with probability[i], else for
+    alias[i]."""
+    count = len(weights)
+    scaled = (np.asarray(weights, np.float64) * (count / np.sum(weights))).tolist()
+    probability, alias = np.ones(count, np.float32), np.arange(count, dtype=np.uint32)
+    small = [i for i, w in enumerate(scaled) if w < 1.0]
+    large = [i for i, w in enumerate(scaled) if w >= 1.0]
+    while small and large:
+        i, j = small.pop(), large[-1]
+        probability[i], alias[i] = scaled[i], j
+        scaled[j] -= 1.0 - scaled[i]
+        if scaled[j] < 1.0:
+            small.append(large.pop())
+    return probability, alias
+
+
+@dataclass(frozen=True, eq=False)
+class EnvironmentTable:
+    """Piecewise constant density over the unit square of a lat-long image, rows from +y.
+
+    marginal     (height + 1,) cumulative distribution of rows
+    conditional  (height, width + 1) of the texels of each row
+    texel_pdf    (height, width) density over the unit square
+    """
+
+    marginal: npt.NDArray[np.float32]
+    conditional: npt.NDArray[np.float32]
+    texel_pdf: npt.NDArray[np.float32]
+
+
+def environment_table(image: Image) -> EnvironmentTable | None:
+    """The table of an image, by luminance times the sine of the polar angle; None where it is black."""
+    brightness = luminance(image.pixels)
+    # Bilinear interpolation carries a texel's light half a texel further; the density follows it there.
+    brightness = (np.roll(brightness, 1, axis=1) + 2 * brightness + np.roll(brightness, -1, axis=1)) / 4
+    padded = np.pad(brightness, ((1, 1), (0, 0)), mode="edge")
+    brightness = (padded[:-2] + 2 * brightness + padded[2:]) / 4
+    height, width = brightness.shape
+    weight = brightness * np.sin((np.arange(height) + 0.5) * np.pi / height)[:, None]
+    total = weight.sum()
+    if not total > 0:
+        return None
+    rows = weight.sum(axis=1)
+    conditional = np.zeros((height, width + 1))
+    np.cumsum(weight, axis=1, out=conditional[:, 1:])
+    # A black row is never chosen; a ramp keeps its table valid.
+    conditional[rows == 0] = np.linspace(0, 1, width + 1)
+    conditional /= conditional[:, -1:]
+    marginal = np.concatenate([[0.0], np.cumsum(rows)]) / total
+    marginal[-1] = 1.0
+    return EnvironmentTable(
+        marginal.astype(np.float32),
+        conditional.astype(np.float32),
+        (weight / total * (width * height)).astype(np.float32),
+    )

@@ -1,0 +1,317 @@
+"""The renderer as the window sees it: views and requests go in, messages come out, nothing blocks.
+
+`ThreadedRenderer` runs a `Live` in a thread of its own. The device is opened in there too, so that the window
+stands before the first kernel is compiled. PyOpenCL lets other threads run while the device works.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Protocol
+
+from incpt.core.errors import DeviceError, InputError, OutputError, one_line
+from incpt.device.device import Device
+from incpt.scene.model import Scene
+from incpt.viewer.viewer import Frame, Live, RenderingStoppedError, View
+
+_NICER = 5
+
+DRAWING_SECONDS = 0.025
+"""The longest that a drag's next step waits for the window to draw the last one."""
+FIGURES_SECONDS = 0.1
+"""Between two Frames with the same picture; a window redraws for each."""
+
+
+@dataclass(frozen=True)
+class Pick:
+    """Which object is at `point`, in units of the image from the top left? `additive` comes back as it is."""
+
+    point: tuple[float, float]
+    additive: bool = False
+
+
+@dataclass(frozen=True)
+class Export:
+    """Write the picture: .exr is linear radiance, `aovs` adds first-hit layers; .png is tone-mapped as
+    `exposure` and `curve` say."""
+
+    path: Path
+    aovs: bool = False
+    exposure: float = 0.0
+    curve: str = "agx"
+
+
+@dataclass(frozen=True)
+class Pin:
+    """Compare with the picture as it is now, or no longer."""
+
+    on: bool
+
+
+@dataclass(frozen=True)
+class Restart:
+    """Throw away what was accumulated."""
+
+
+Request = Pick | Export | Pin | Restart
+
+
+@dataclass(frozen=True)
+class Building:
+    """`done` of `total` steps of building the kernels are done."""
+
+    done: int
+    total: int
+
+
+@dataclass(frozen=True)
+class Picked:
+    """The answer to a Pick: the object's name, or None."""
+
+    point: tuple[float, float]
+    name: str | None
+    additive: bool
+
+
+@dataclass(frozen=True)
+class Exported:
+    """The picture is in the file."""
+
+    path: Path
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One line that names the place and the fix. After a fatal one the renderer does nothing more."""
+
+    text: str
+    fatal: bool = False
+
+
+Message = Frame | Building | Picked | Exported | Problem
+
+
+class Renderer(Protocol):
+    """What the editor needs of a renderer. No call blocks but `close`."""
+
+    def show(self, view: View) -> None:
+        """Render this from now on; of several calls the last one counts."""
+        ...
+
+    def request(self, request: Request) -> None:
+        """Do this between two steps, in the order of the calls."""
+        ...
+
+    def poll(self) -> list[Message]:
+        """What came since the last call; of Frames, and of Buildings, the latest only."""
+        ...
+
+    def close(self) -> None:
+        """Stop after the step under way and free the device."""
+        ...
+
+
+class NullRenderer:
+    """Renders nothing: for tests of the editor. It keeps the `views` and `requests` it is given; a Pick is
+    answered with `picks[point]` (None where there is no such point), and `messages` are polled next."""
+
+    def __init__(self) -> None:
+        self.views: list[View] = []
+        self.requests: list[Request] = []
+        self.picks: dict[tuple[float, float], str | None] = {}
+        self.messages: list[Message] = []
+        self.closed = False
+
+    def show(self, view: View) -> None:
+        self.views.append(view)
+
+    def request(self, request: Request) -> None:
+        self.requests.append(request)
+        if isinstance(request, Pick):
+            name = self.picks.get(request.point)
+            self.messages.append(Picked(request.point, name, request.additive))
+
+    def poll(self) -> list[Message]:
+        messages, self.messages = self.messages, []
+        return messages
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class ThreadedRenderer:
+    """A Live on `device` (what chooses one: see `Device`) in a thread. `wake` is called there whenever
+    messages are ready."""
+
+    def __init__(
+        self, device: Device | str | int | None = None, wake: Callable[[], None] | None = None
+    ) -> None:
+        self._device = device
+        self._wake = wake or (lambda: None)
+        self._condition = threading.Condition()
+        self._view: View | None = None
+        self._requests: deque[Request] = deque()
+        self._messages: list[Message] = []
+        self._closing = False
+        self._images: tuple[object, ...] = ()
+        self._posted_at = 0.0
+        self._drawn: Scene | None = None
+        self._thread = threading.Thread(target=self._run, name="renderer", daemon=True)
+        self._thread.start()
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the thread runs: not after `close`, nor after a fatal problem."""
+        return self._thread.is_alive()
+
+    def show(self, view: View) -> None:
+        with self._condition:
+            self._view = view
+            self._condition.notify()
+
+    def request(self, request: Request) -> None:
+        with self._condition:
+            self._requests.append(request)
+            self._condition.notify()
+
+    def poll(self) -> list[Message]:
+        with self._condition:
+            messages, self._messages = self._messages, []
+        return messages
+
+    def close(self) -> None:
+        with self._condition:
+            self._closing = True
+            self._condition.notify()
+        self._thread.join()
+
+    def _post(self, message: Message) -> None:
+        with self._condition:
+            if isinstance(message, Frame | Building):
+                self._messages = [m for m in self._messages if type(m) is not type(message)]
+            self._messages.append(message)
+        self._wake()
+
+    def _is_worth_showing(self, frame: Frame) -> bool:
+        """Whether it has a new picture, or new figures after a while."""
+        now = time.perf_counter()
+        images = (*(picture.image for picture in frame.pictures), frame.aovs)
+        is_new = len(images) != len(self._images) or any(
+            new is not old for new, old in zip(images, self._images, strict=True)
+        )
+        if not (is_new or frame.resting or now - self._posted_at >= FIGURES_SECONDS):
+            return False
+        self._images, self._posted_at = images, now
+        return True
+
+    def _wait_for_news(self, seen: View | None) -> None:
+        """Until there is a request or another view than `seen`, or the window closes."""
+        with self._condition:
+            self._condition.wait_for(
+                lambda: (
+                    self._closing
+                    or (self._view is not None and (self._view is not seen or bool(self._requests)))
+                )
+            )
+
+    def _take_requests(self) -> list[Request]:
+        with self._condition:
+            requests = list(self._requests)
+            self._requests.clear()
+        return requests
+
+    def _has_edit_after(self, view: View) -> bool:
+        latest = self._view
+        return latest is not None and latest.scene is not view.scene
+
+    def _run(self) -> None:
+        try:
+            self._loop()
+        except _ClosedError:
+            pass
+        except (InputError, DeviceError, MemoryError) as error:
+            self._post(Problem(_explain(error), fatal=True))
+        except Exception as error:
+            self._post(Problem(f"unexpected {type(error).__name__}: {one_line(error)}", fatal=True))
+
+    def _report_building(self, done: int, total: int) -> None:
+        self._post(Building(done, total))
+        if self._closing:
+            raise _ClosedError
+
+    def _loop(self) -> None:
+        _give_way()
+        device = self._device if isinstance(self._device, Device) else Device(self._device)
+        self._wait_for_news(None)
+        if self._view is None:
+            return
+        live = Live(self._view, device, self._report_building)
+        while not self._closing:
+            for request in self._take_requests():
+                self._answer(live, request)
+            view = self._view
+            try:
+                frame = live.advance(view, partial(self._has_edit_after, view))
+            except RenderingStoppedError:
+                raise
+            except (InputError, DeviceError, MemoryError) as error:
+                self._post(Problem(_explain(error)))
+                continue
+            if frame is None:
+                self._wait_for_news(view)
+            elif self._is_worth_showing(frame):
+                self._post(frame)
+                if live.device.is_cpu:
+                    self._let_draw(frame)
+
+    def _let_draw(self, frame: Frame) -> None:
+        """In a drag, leave the processor to the window while it draws the first picture of an edit: on
+        software OpenGL a frame takes twice as long beside rendering. The next edit ends it."""
+        view, picture = frame.view, frame.pictures[-1]
+        if view.before is None or view.scene is self._drawn or not picture.replaced.any():
+            return
+        self._drawn = view.scene
+        with self._condition:
+            self._condition.wait_for(
+                lambda: self._closing or bool(self._requests) or self._has_edit_after(view), DRAWING_SECONDS
+            )
+
+    def _answer(self, live: Live, request: Request) -> None:
+        try:
+            if isinstance(request, Pick):
+                self._post(Picked(request.point, live.pick(request.point), request.additive))
+            elif isinstance(request, Export):
+                live.export(request.path, request.aovs, request.exposure, request.curve)
+                self._post(Exported(request.path))
+            elif isinstance(request, Pin):
+                live.pin_reference(request.on)
+            else:
+                live.restart()
+        except (InputError, DeviceError, OutputError, MemoryError) as error:
+            self._post(Problem(_explain(error)))
+
+
+class _ClosedError(Exception):
+    """The window closed while kernels were being built."""
+
+
+def _give_way() -> None:
+    """Let the window go first where rendering and drawing share the processor: on Linux a thread has a
+    priority of its own, which the threads of a device on the CPU inherit."""
+    if sys.platform == "linux":
+        thread = threading.get_native_id()
+        os.setpriority(os.PRIO_PROCESS, thread, os.getpriority(os.PRIO_PROCESS, thread) + _NICER)
+
+
+def _explain(error: Exception) -> str:
+    if isinstance(error, MemoryError):
+        return "memory ran out; use a smaller image or scene"
+    return one_line(error)

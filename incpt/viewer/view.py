@@ -1,0 +1,98 @@
+"""What a viewer asks for, a `View`, and what it gets, a `Frame`: values that pass between threads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from incpt.render import tiles
+from incpt.render.first_hits import Aovs
+from incpt.render.modes import Mode
+from incpt.scene.model import Scene
+
+Float32Image = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class View:
+    """What a viewer wants to see; handing in an equal one again does nothing.
+
+    scene             its settings say how to render.
+    before            the scene before the drag of which `scene` is one step; None: no drag is under way.
+    point             clicked last, (x, y) from the top left in units of the image.
+    resolution_scale  the picture has the settings' size times this.
+    target_spp        samples per pixel at which refining stops.
+    step_ms           what a step aims at.
+    drag_nor          the most repetitions of a tile while a drag is under way.
+    split             also render under "restart", fed with the same edits.
+    aovs              first-hit images are wanted.
+    """
+
+    scene: Scene
+    before: Scene | None = None
+    point: tuple[float, float] | None = None
+    resolution_scale: float = 1.0
+    paused: bool = False
+    target_spp: int | None = None
+    step_ms: float = 33.0
+    drag_nor: int = 16
+    split: bool = False
+    aovs: bool = False
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height to render, pixels."""
+        width, height = (max(1, round(side * self.resolution_scale)) for side in self.scene.settings.size)
+        return width, height
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """One side.
+
+    image       (h, w, 4) float32 mean radiance, linear, row 0 on top; alpha 0 where there is no sample of
+                this size yet. The same array again in the next Frame where nothing new was read.
+    queue       (n,) int32 tiles in order; `queue_done` of them are finished.
+    tile_spp    (count,) int64 samples behind each tile.
+    replaced    (count,) bool: tiles finished since the last change of the scene.
+    seconds     rendering time since the last change of the scene.
+    error       normalized RMSE against the pinned reference, or None.
+    """
+
+    image: Float32Image
+    grid: tiles.TileGrid
+    mode: Mode
+    queue: npt.NDArray[np.int32]
+    queue_done: int
+    tile_spp: npt.NDArray[np.int64]
+    replaced: npt.NDArray[np.bool_]
+    seconds: float
+    error: float | None
+    strategy: str
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """What there is to show.
+
+    view         what it shows.
+    pictures     the one under the chosen strategy; with a split view that under "restart" before it.
+    is_preview   rendered at a reduced resolution, because everything started over and the view does not rest.
+    aovs         first-hit images of the view's size, or smaller while changes stream in.
+    nonfinite    samples since the last change of the scene that were not finite and count as black.
+    resting      paused, or the target is reached: nothing is under way.
+    is_pinned    there is a reference to compare with, or there will be once the picture is whole.
+    """
+
+    view: View
+    pictures: tuple[Picture, ...]
+    is_preview: bool
+    step_seconds: float
+    paths_per_second: float
+    device: str
+    aovs: Aovs | None
+    nonfinite: int
+    resting: bool
+    is_pinned: bool = False

@@ -1,0 +1,247 @@
+"""The opaque surface of cl/material.cl: its samples, its symmetry, and its energy."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from support.kernels import SIGNIFICANCE, call, direction, direction_p_value, struct_rows, uniforms
+
+from incpt.core import layout
+from incpt.scene.material import Material
+from incpt.tables import albedo
+
+COUNT = 1 << 16
+Array = npt.NDArray[np.floating]
+
+MATERIALS = {
+    "lambert": Material((0.8, 0.5, 0.2), specular=0.0),
+    "white lambert": Material((1, 1, 1), specular=0.0),
+    "matt plastic": Material((0.8, 0.3, 0.1), roughness=0.9),
+    "plastic": Material((0.8, 0.3, 0.1), roughness=0.5),
+    "glossy white plastic": Material((1, 1, 1), roughness=0.3),
+    "black plastic": Material((0, 0, 0), roughness=0.4),
+    "dense plastic": Material((0.5, 0.5, 0.5), roughness=0.6, ior=2.4),
+    "half a layer": Material((0.9, 0.9, 0.9), roughness=0.4, specular=0.5),
+    "metal": Material((0.9, 0.6, 0.3), metallic=1.0, roughness=0.4),
+    "rough metal": Material((1, 1, 1), metallic=1.0, roughness=1.0),
+    "half metal": Material((0.9, 0.6, 0.3), metallic=0.5, roughness=0.7),
+}
+ANGLES_DEG = (0.0, 35.0, 70.0, 86.0)
+
+_SURFACE = "Surface s = surface_of(material, layer); Vec3 wo = vec3(ox[i], oy[i], oz[i]);"
+
+
+def _arguments(material: Material) -> dict[str, npt.NDArray[np.generic]]:
+    values = {k: v for k, v in asdict(material).items() if k in (layout.MATERIAL.names or ())}
+    return {"material": struct_rows(layout.MATERIAL, [values]), "layer": albedo.layer_row(material)}
+
+
+def _components(prefix: str, w: Array, count: int) -> dict[str, npt.NDArray[np.float32]]:
+    w = np.broadcast_to(np.reshape(w, (3, -1)), (3, count)).astype(np.float32)
+    return {prefix + axis: np.ascontiguousarray(row) for axis, row in zip("xyz", w, strict=True)}
+
+
+def evaluate(material: Material, wo: Array, wi: Array, features: tuple[str, ...] = ()) -> tuple[Array, Array]:
+    """f cos (3, N) and pdf (N,) for directions (3,) or (3, N)."""
+    count = max(np.reshape(wo, (3, -1)).shape[1], np.reshape(wi, (3, -1)).shape[1])
+    body = _SURFACE + """BsdfValue b = eval_surface(&s, wo, vec3(ix[i], iy[i], iz[i]));
+        r[i] = b.f_cos.x; g[i] = b.f_cos.y; b_[i] = b.f_cos.z; pdf[i] = b.pdf;"""  # fmt: skip
+    r, g, b, pdf = call(
+        "material", body, count, ("r", "g", "b_", "pdf"), features, **_components("o", wo, count),
+        **_components("i", wi, count), **_arguments(material),
+    )  # fmt: skip
+    return np.stack([r, g, b]), pdf
+
+
+def sample(
+    material: Material, wo: Array, count: int, seed: int = 11, features: tuple[str, ...] = ()
+) -> tuple[Array, Array, Array]:
+    """wi (3, N), weight (3, N), pdf (N,)."""
+    u, v, lobe = uniforms(count, 3, seed)
+    body = _SURFACE + """Uniform2 uv; uv.u = u[i]; uv.v = v[i];
+        BsdfSample b = sample_surface(&s, wo, uv, lobe[i]); x[i] = b.wi.x; y[i] = b.wi.y; z[i] = b.wi.z;
+        r[i] = b.weight.x; g[i] = b.weight.y; b_[i] = b.weight.z; pdf[i] = b.pdf;"""  # fmt: skip
+    results = call(
+        "material", body, count, ("x", "y", "z", "r", "g", "b_", "pdf"), features,
+        **_components("o", wo, count), u=u, v=v, lobe=lobe, **_arguments(material),
+    )  # fmt: skip
+    return np.stack(results[:3]), np.stack(results[3:6]), results[6]
+
+
+def wo_at(angle_deg: float) -> npt.NDArray[np.float64]:
+    return direction(np.radians(angle_deg), 0.4)
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+def test_samples_follow_the_density(name: str) -> None:
+    for angle in ANGLES_DEG:
+        wo = wo_at(angle)
+        wi, _, pdf = sample(MATERIALS[name], wo, COUNT)
+        p_value, total = direction_p_value(
+            wi, pdf > 0, lambda d, wo=wo: evaluate(MATERIALS[name], wo, d)[1], rows=32, subdivision=32
+        )
+        assert p_value > SIGNIFICANCE, angle
+        lost = (pdf == 0).mean()  # reflections that a microfacet sends below the surface
+        assert total == pytest.approx(1 - lost, abs=0.006), angle
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+def test_a_sample_weighs_its_value_over_its_density(name: str) -> None:
+    for angle in ANGLES_DEG:
+        wi, weight, pdf = sample(MATERIALS[name], wo_at(angle), 4096)
+        value, density = evaluate(MATERIALS[name], wo_at(angle), wi)
+        valid = pdf > 0
+        np.testing.assert_allclose(density[valid], pdf[valid], rtol=2e-3)
+        np.testing.assert_allclose(weight[:, valid], value[:, valid] / density[valid], rtol=2e-3, atol=1e-6)
+        assert (weight[:, ~valid] == 0).all()
+        np.testing.assert_allclose(np.linalg.norm(wi, axis=0), 1, atol=1e-5)
+        assert (wi[2, valid] > 0).all()
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+def test_reciprocity(name: str) -> None:
+    z, phi, y, psi = (a.astype(np.float64) for a in uniforms(5000, 4, 12))
+    wo, wi = (
+        direction(np.arccos(z * 0.98 + 0.02), 6.3 * phi),
+        direction(np.arccos(y * 0.98 + 0.02), 6.3 * psi),
+    )
+    forward, backward = (
+        evaluate(MATERIALS[name], wo, wi)[0] / wi[2],
+        evaluate(MATERIALS[name], wi, wo)[0] / wo[2],
+    )
+    np.testing.assert_allclose(forward, backward, rtol=1e-3, atol=1e-6)
+
+
+def test_nothing_below_the_surface() -> None:
+    wi = direction(np.linspace(np.pi / 2 + 1e-3, np.pi, 100), 1.0)
+    for material in MATERIALS.values():
+        for wo, w in ((wo_at(30), wi), (-wo_at(30), wi), (wi, wo_at(30)[:, None])):
+            value, pdf = evaluate(material, wo, w)
+            assert (value == 0).all() and (pdf == 0).all()
+
+
+def reflected_share(material: Material, angle_deg: float, count: int = COUNT) -> Array:
+    """(3,) of white light from everywhere: by stratified samples, 2^8 x 2^8 in the square."""
+    return np.asarray(sample(material, wo_at(angle_deg), count)[1].mean(axis=1, dtype=np.float64))
+
+
+def test_furnace_lambert_is_exact() -> None:
+    for name in ("lambert", "white lambert"):
+        for angle in ANGLES_DEG:
+            share = reflected_share(MATERIALS[name], angle, 1024)
+            np.testing.assert_allclose(share, MATERIALS[name].base_color, rtol=1e-5)
+
+
+def integral(material: Material, angle_deg: float) -> Array:
+    """(3,) of f cos over the hemisphere, by the midpoint rule in double resolution around the mirror image
+    of wo: spherical coordinates about it, whose polar angle grows with the cube of the grid's."""
+    wo = wo_at(angle_deg)
+    mirror = wo * [-1, -1, 1]
+    n, m = 600, 240
+    t = (np.arange(n) + 0.5) / n
+    theta, dtheta = np.pi * t**3, 3 * np.pi * t**2 / n
+    phi = (np.arange(m) + 0.5) * 2 * np.pi / m
+    local = direction(theta[:, None], phi[None, :]).reshape(3, -1)
+    tangent = np.cross(mirror, [0.3, -0.7, 0.2])
+    tangent /= np.linalg.norm(tangent)
+    frame = np.stack([tangent, np.cross(mirror, tangent), mirror], axis=1)
+    value = evaluate(material, wo, frame @ local)[0].reshape(3, n, m)
+    return np.asarray(np.einsum("cij,i->c", value, np.sin(theta) * dtheta * 2 * np.pi / m))
+
+
+@pytest.mark.parametrize("roughness", [0.2, 0.4, 0.6, 0.8, 1.0])
+@pytest.mark.parametrize("ior", [1.2, 1.5, 2.0])
+def test_furnace_white_plastic(roughness: float, ior: float) -> None:
+    material = Material((1, 1, 1), roughness=roughness, ior=ior)
+    for angle in (0.0, 20.0, 45.0, 70.0, 80.0, 87.0):
+        np.testing.assert_allclose(integral(material, angle), 1, atol=0.01)
+
+
+@pytest.mark.parametrize("roughness", [0.05, 0.1])
+def test_furnace_polished_white_plastic(roughness: float) -> None:
+    # Too narrow a reflection for a grid: by samples.
+    material = Material((1, 1, 1), roughness=roughness)
+    for angle in (0.0, 45.0, 70.0, 80.0, 87.0):
+        np.testing.assert_allclose(reflected_share(material, angle), 1, atol=0.01)
+
+
+@pytest.mark.parametrize("angle", ANGLES_DEG)
+def test_samples_estimate_the_integral(angle: float) -> None:
+    for name in ("plastic", "half a layer", "dense plastic", "metal", "half metal"):
+        estimate = reflected_share(MATERIALS[name], angle)
+        np.testing.assert_allclose(estimate, integral(MATERIALS[name], angle), rtol=0.01, atol=2e-3)
+
+
+@cache
+def _single_scattering(roughness: float, cosine: float) -> tuple[float, float]:
+    """A and B of albedo.table by a sum over the hemisphere of half vectors, in double precision: GGX,
+    height-correlated Smith, reflectance 1 (A) and (1 - <wo, h>)^5 (B)."""
+    alpha2 = max(roughness**2, layout.MIN_ALPHA) ** 2
+    # tan^2 of the half vector's angle by GGX's own distribution, so that all alphas are resolved alike.
+    n, m = 1500, 300
+    s = (np.arange(n) + 0.5) / n
+    t = 1 - (1 - s) ** 2
+    tan2 = alpha2 * t / (1 - t)
+    cos_h = 1 / np.sqrt(1 + tan2)
+    phi = (np.arange(m) + 0.5) * np.pi / m
+    sine = np.sqrt(1 - cosine**2)
+    o_h = sine * np.sqrt(1 - cos_h**2)[:, None] * np.cos(phi) + cosine * cos_h[:, None]
+    mu_i = 2 * o_h * cos_h[:, None] - cosine
+    good = (o_h > 0) & (mu_i > 0)
+    root_o = np.sqrt(alpha2 + (1 - alpha2) * cosine**2)
+    root_i = np.sqrt(alpha2 + (1 - alpha2) * np.where(good, mu_i, 1) ** 2)
+    g2 = 2 * cosine * mu_i / (cosine * root_i + mu_i * root_o)
+    # f cos_i = D G2 / (4 cos_o) per wi; d wi = 4 o_h d h; D cos_h has density 1 in (t, phi).
+    value = np.where(good, g2 * o_h / (cosine * cos_h[:, None]), 0) * (2 * (1 - s))[:, None]
+    schlick = (1 - np.clip(o_h, 0, 1)) ** 5
+    return float(value.mean()), float((value * schlick).mean())
+
+
+@pytest.mark.parametrize("row", [2, 5, 10, 16, 24, 31])
+def test_albedo_table(row: int) -> None:
+    table, last = albedo.table(), layout.ALBEDO_TABLE_SIZE - 1
+    for column in (1, 3, 8, 16, 24, 31):
+        expected = _single_scattering(row / last, column / last)
+        np.testing.assert_allclose(table[:, row, column], expected, atol=2e-3)
+
+
+@pytest.mark.parametrize("roughness", [0.2, 0.5, 0.8, 1.0])
+def test_furnace_metal_loses_what_scatters_twice(roughness: float) -> None:
+    white = Material((1, 1, 1), metallic=1.0, roughness=roughness)
+    gold = Material((1.0, 0.7, 0.3), metallic=1.0, roughness=roughness)
+    for angle in (0.0, 45.0, 75.0):
+        a, b = _single_scattering(roughness, float(np.cos(np.radians(angle))))
+        assert a <= 1
+        np.testing.assert_allclose(integral(white, angle), a, atol=4e-3)
+        expected = [f0 * (a - b) + b for f0 in gold.base_color]
+        np.testing.assert_allclose(integral(gold, angle), expected, atol=4e-3)
+
+
+def test_no_material_reflects_more_than_arrives() -> None:
+    rng = np.random.default_rng(13)
+    for _ in range(25):
+        material = Material(
+            (1, 1, 1), metallic=float(rng.random()), roughness=float(0.2 + 0.8 * rng.random()),
+            specular=float(rng.random()), ior=float(1 + 2 * rng.random()),
+        )  # fmt: skip
+        assert integral(material, float(88 * rng.random())).max() < 1.01
+
+
+@pytest.mark.parametrize("angle_deg", [*ANGLES_DEG, 100.0])
+@pytest.mark.parametrize("name", ["lambert", "white lambert"])
+def test_variant_for_matt_scenes_is_the_same(name: str, angle_deg: float) -> None:
+    """Without a layer and metal, what the variant leaves out makes no difference."""
+    material, wo = MATERIALS[name], wo_at(angle_deg)
+    u, v = uniforms(COUNT // 16, 2, 5)
+    wi = direction(np.arccos(1 - 2 * u), 2 * np.pi * v)
+    for general, matt in zip(evaluate(material, wo, wi), evaluate(material, wo, wi, ("MATT",)), strict=True):
+        assert matt.any() == (angle_deg < 90)
+        np.testing.assert_allclose(matt, general, rtol=1e-5, atol=1e-7)
+    if angle_deg < 90:
+        pairs = zip(sample(material, wo, 4096), sample(material, wo, 4096, features=("MATT",)), strict=True)
+        for general, matt in pairs:
+            np.testing.assert_allclose(matt, general, rtol=1e-4, atol=1e-6)

@@ -1,0 +1,618 @@
+"""The editor as a whole: what the renderer is shown, what it answers, the mouse in the picture, undo."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from support.small_scenes import mixed_scene
+from support.ui_harness import Desk, changes, desk, flat, state
+
+from incpt.core.errors import DeviceError, InputError
+from incpt.render import tiles
+from incpt.render.modes import Mode
+from incpt.scene import edits
+from incpt.scene.model import Scene
+from incpt.scene.selection import Selection
+from incpt.ui.commands import actions, commands
+from incpt.ui.editor.messages import Messages
+from incpt.ui.panels.notices import status_text
+from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
+from incpt.viewer.threaded import Building, Export, Exported, Message, Pick, Picked, Pin, Problem
+from incpt.viewer.viewer import Frame, Picture, View
+
+SCENE = mixed_scene(size=(48, 32))
+
+
+@pytest.fixture
+def user() -> Iterator[Desk]:
+    with desk(SCENE) as made:
+        yield made
+
+
+def frame_of(view: View, mode: Mode = Mode.REFINE, spp: int = 4, error: float | None = None) -> Frame:
+    """What a renderer would send: a grey picture."""
+    grid = tiles.TileGrid(*view.size, view.scene.settings.tile_size)
+    picture = Picture(
+        image=np.full((view.size[1], view.size[0], 4), 0.5, np.float32),
+        grid=grid,
+        mode=mode,
+        queue=np.arange(grid.count, dtype=np.int32),
+        queue_done=2,
+        tile_spp=np.full(grid.count, spp, np.int64),
+        replaced=np.ones(grid.count, np.bool_),
+        seconds=1.0,
+        error=error,
+        strategy=view.scene.settings.strategy,
+    )
+    pictures = (replace(picture, strategy="restart"), picture) if view.split else (picture,)
+    return Frame(view, pictures, False, 0.02, 1e6, "a device", None, 0, False)
+
+
+def tell(user: Desk, *messages: Message) -> None:
+    user.null.messages += messages
+    user.frames(3)  # a window that appears has its size and place in its second frame
+
+
+# ---------------------------------------------------------------------------------------- what is shown
+
+
+def test_frames_without_a_change_show_equal_views(user: Desk) -> None:
+    user.frames(5)
+    assert len(user.null.views) >= 8 and all(view == user.null.views[0] for view in user.null.views)
+    assert user.null.views[-1].scene is SCENE and user.null.views[-1].before is None
+
+
+def test_edits_of_one_frame_are_one_view(user: Desk) -> None:
+    user.null.views.clear()
+    user.editor.select(Selection(("red cube",)))
+    user.editor.propose(SCENE.with_object("red cube", position=(1, 1, 1)), "Move")
+    user.editor.propose(user.scene.with_camera(fov_y=50), "Camera")
+    user.editor.propose(user.scene.with_material("red", metallic=1.0), "Material")
+    assert user.null.views == []
+    user.frame()
+    assert len(user.null.views) == 1
+    assert changes(flat(SCENE), flat(user.null.views[0].scene)) == {
+        "camera.fov_y",
+        "materials.red.metallic",
+        *(f"objects.red cube.position.{i}" for i in range(3)),
+    }
+
+
+def test_a_panel_and_the_picture_in_one_frame_are_one_view(user: Desk) -> None:
+    user.editor.select(Selection(("red cube",)))
+    user.frames(2)
+    user.open_field("Position X")
+    user.key("Ctrl+A")
+    user.write("3")
+    # The click into the picture ends the typing and begins an orbit in the same frame.
+    user.move(*user.at_picture(0.1, 0.1))
+    user.press(2)
+    user.press(0)
+    seen = [view.scene for view in user.null.views]
+    assert seen[-1].object("red cube").position == (3, 0.5, 0)
+    user.release(0)
+    user.release(2)
+
+
+def test_display_never_changes_the_scene_that_is_shown(user: Desk) -> None:
+    user.panel("Method")
+    before = user.editor.view
+    user.type("Exposure", "3")
+    user.choose("Curve", "sRGB, clipped")
+    for label in ("Tile grid", "Outline"):
+        user.click(label)
+    for name in ("Order of the queue", "Samples per pixel", "Replaced tiles"):
+        user.run(name)
+    assert user.editor.view == before and all(view == before for view in user.null.views)
+    user.run("Normals")
+    assert user.editor.view == replace(before, aovs=True)
+    user.run("None")
+    user.run("Split view")
+    assert user.editor.view == replace(before, split=True)
+    assert all(view.scene is SCENE for view in user.null.views)
+
+
+def test_controls_reach_the_renderer(user: Desk) -> None:
+    before = user.editor.view
+    user.panel("Render")
+    user.type("Target spp", "64")
+    user.type("Resolution", "50")
+    user.type("Step time", "20")
+    user.type("NoR in a drag", "4")
+    user.click("Pause")
+    wanted = replace(before, target_spp=64, resolution_scale=0.5, step_ms=20.0, drag_nor=4, paused=True)
+    assert user.null.views[-1] == wanted and user.null.views[-1].size == (24, 16)
+    user.click("Go on")
+    user.type("Target spp", "0")
+    assert user.null.views[-1] == replace(wanted, paused=False, target_spp=None)
+
+
+# ------------------------------------------------------------------------------------ mouse in the picture
+
+
+def test_a_click_picks_and_clicks_on_nothing_deselect(user: Desk) -> None:
+    for button in (0, 1):
+        where = user.at_picture(0.5, 0.5)
+        user.null.picks = dict.fromkeys([(0.5, 0.5)], "red cube")
+        user.click_at(*where, button)
+        (request,) = user.null.requests
+        assert isinstance(request, Pick) and not request.additive
+        assert request.point == pytest.approx((0.5, 0.5), abs=2e-3) and user.editor.point == request.point
+        tell(user, Picked(request.point, "red cube", False))
+        assert user.editor.selection.names == ("red cube",)
+        user.null.requests.clear()
+        user.click_at(*user.at_picture(0.05, 0.05), button)
+        assert not user.editor.selection
+        user.null.requests.clear()
+    assert user.scene is SCENE and user.undo_count == 0
+
+
+def test_ctrl_picks_more_than_one(user: Desk) -> None:
+    user.editor.select(Selection(("lamp",)))
+    with user.held_keys("Ctrl"):
+        user.click_at(*user.at_picture(0.3, 0.1))
+    assert isinstance(user.null.requests[-1], Pick) and user.null.requests[-1].additive
+    tell(user, Picked((0.3, 0.1), "red cube", True))
+    assert user.editor.selection.names == ("lamp", "red cube")
+    tell(user, Picked((0.3, 0.1), "lamp", True))
+    assert user.editor.selection.names == ("red cube",)
+    tell(user, Picked((0.3, 0.1), None, True))
+    assert user.editor.selection.names == ("red cube",)
+    tell(user, Picked((0.3, 0.1), None, False))
+    assert user.editor.selection.names == ()
+
+
+def test_a_click_beside_the_picture_deselects(user: Desk) -> None:
+    beside = (user.rect[0] + 20, user.rect[1] + 20)
+    assert beside[1] < user.picture[1]
+    user.editor.select(Selection(("lamp",)))
+    with user.held_keys("Ctrl"):
+        user.click_at(*beside)
+    assert user.editor.selection.names == ("lamp",)
+    user.click_at(*beside)
+    assert user.editor.selection.names == () and not user.null.requests and user.editor.point is None
+
+
+def test_a_pick_of_what_is_gone_selects_nothing(user: Desk) -> None:
+    user.editor.select(Selection(("lamp",)))
+    tell(user, Picked((0.5, 0.5), "gone", False))
+    assert user.editor.selection.names == ()
+    user.editor.select(Selection(("lamp",)))
+    tell(user, Picked((0.5, 0.5), "gone", True))
+    assert user.editor.selection.names == ("lamp",)
+
+
+@pytest.mark.parametrize(
+    ("navigation", "button", "modifiers", "label"),
+    [
+        ("blender", 2, "", "Orbit"),
+        ("blender", 2, "Shift", "Pan"),
+        ("blender", 2, "Ctrl", "Dolly"),
+        ("blender", 0, "Alt", "Orbit"),
+        ("plain", 0, "", "Orbit"),
+        ("plain", 2, "", "Pan"),
+        ("plain", 0, "Shift", "Pan"),
+        ("plain", 1, "Alt", "Dolly"),
+        ("plain", 1, "", "Fly"),
+    ],
+)
+def test_a_drag_moves_the_camera(
+    user: Desk, navigation: str, button: int, modifiers: str, label: str
+) -> None:
+    user.editor.choose_navigation(navigation)
+    start = user.at_picture(0.2, 0.2)
+    if modifiers:
+        with user.held_keys(modifiers):
+            user.drag_at(start, (60.0, 40.0), button=button)
+    else:
+        user.drag_at(start, (60.0, 40.0), button=button)
+    user.frames(2)
+    changed = changes(flat(SCENE), flat(user.scene))
+    assert changed and all(place.startswith("camera.") for place in changed)
+    assert user.editor.document.history.undo_label == label and user.undo_count == 1
+    assert not user.null.requests and not user.editor.is_flying
+    user.key("Ctrl+Z")
+    assert user.scene == SCENE
+
+
+def test_a_drag_with_the_selecting_button_alone_does_nothing_in_blenders_set(user: Desk) -> None:
+    user.drag_at(user.at_picture(0.2, 0.2), (60.0, 40.0))
+    assert user.scene is SCENE and not user.null.requests
+
+
+def test_a_camera_drag_is_given_up_by_escape(user: Desk) -> None:
+    x, y = user.at_picture(0.2, 0.2)
+    user.editor.select(Selection(("lamp",)))
+    user.hold_at((x, y), (60.0, 40.0), button=2)
+    assert user.scene != SCENE and user.editor.view.before is SCENE
+    user.key("Escape")
+    user.move(x + 100, y)
+    user.release(2)
+    user.frames(2)
+    assert user.scene == SCENE and user.undo_count == 0 and user.editor.selection.names == ("lamp",)
+
+
+def test_turns_of_the_wheel_are_one_entry_until_they_rest(user: Desk) -> None:
+    user.move(*user.at_picture(0.2, 0.2))
+    for _ in range(3):
+        user.wheel(1.0)
+        user.frames(3)
+    assert user.editor.is_waiting and user.editor.document.history.before is SCENE
+    user.rest(1.0)
+    assert not user.editor.is_waiting and user.undo_count == 1
+    user.wheel(-1.0)
+    user.rest(1.0)
+    assert user.undo_count == 2
+
+
+def test_the_wheel_belongs_to_the_panel_under_it(user: Desk) -> None:
+    user.move(*user.place("object red cube"))
+    user.frame()
+    user.wheel(1.0)
+    assert user.scene is SCENE
+
+
+def test_the_gizmo_moves_what_is_selected(user: Desk) -> None:
+    user.editor.select(Selection(("red cube", "lamp")))
+    user.frames(2)
+    x, y = user.place("gizmo")
+    user.drag_at((x + 60, y), (60.0, 0.0))
+    moved = changes(flat(SCENE), flat(user.scene))
+    assert {p.split(".")[1] for p in moved} == {"red cube", "lamp"} and all(".position." in p for p in moved)
+    by = [
+        np.subtract(user.scene.object(name).position, SCENE.object(name).position)
+        for name in ("red cube", "lamp")
+    ]
+    np.testing.assert_allclose(by[0], by[1], atol=1e-6)
+    assert by[0][0] > 0.01 and np.abs(by[0][1:]).max() < 1e-5
+    assert user.place("gizmo") == pytest.approx((x + 60, y), abs=1.0)  # it follows the mouse
+    assert user.undo_count == 1 and user.editor.document.history.undo_label == "Move"
+    user.key("Ctrl+Z")
+    assert user.scene == SCENE
+
+
+def test_the_gizmo_moves_in_steps(user: Desk) -> None:
+    user.editor.preferences = replace(user.editor.preferences, snap=SnapSettings(True, move_m=0.25))
+    user.editor.select(Selection(("red cube",)))
+    user.frames(2)
+    x, y = user.place("gizmo")
+    user.drag_at((x + 60, y), (300.0, 0.0), steps=12)
+    moved = user.scene.object("red cube").position[0]
+    assert moved > 0 and moved / 0.25 == pytest.approx(round(moved / 0.25), abs=1e-4)
+
+
+def test_the_gizmo_turns_and_scales(user: Desk) -> None:
+    user.editor.select(Selection(("red cube",)))
+    user.run("Scale")
+    x, y = user.place("gizmo")
+    user.drag_at((x, y), (60.0, 0.0))
+    assert {p.split(".")[2] for p in changes(flat(SCENE), flat(user.scene))} == {"scale"}
+    user.key("Ctrl+Z")
+    assert user.scene == SCENE
+
+
+@pytest.mark.parametrize("keys", ["Escape", "Ctrl+Z"])
+def test_a_drag_of_the_gizmo_is_given_up(user: Desk, keys: str) -> None:
+    user.editor.select(Selection(("red cube",)))
+    user.frames(2)
+    x, y = user.place("gizmo")
+    user.hold_at((x + 60, y), (60.0, 0.0))
+    assert user.viewport.gizmo.is_using and user.scene != SCENE
+    user.key(keys)
+    assert user.scene == SCENE
+    user.move(x + 200, y)
+    user.move(x + 220, y)
+    user.release()
+    user.frames(2)
+    assert user.scene == SCENE and user.editor.selection.names == ("red cube",)
+    user.drag_at((x + 60, y), (60.0, 0.0))
+    assert user.scene != SCENE and user.undo_count == 1
+
+
+@pytest.mark.parametrize("keys", ["Shift+D", "Delete", "A", "H"])
+def test_an_edit_under_a_drag_of_the_gizmo_ends_it(user: Desk, keys: str) -> None:
+    user.editor.select(Selection(("red cube",)))
+    user.frames(2)
+    x, y = user.place("gizmo")
+    user.hold_at((x + 60, y), (60.0, 0.0))
+    user.key(keys)
+    scene = user.scene
+    user.move(x + 200, y)
+    user.move(x + 220, y)
+    user.release()
+    user.frames(2)
+    assert user.scene == scene
+
+
+def test_the_camera_moves_with_the_gizmo_under_the_mouse(user: Desk) -> None:
+    user.editor.select(Selection(("red cube",)))
+    user.frames(2)
+    x, y = user.place("gizmo")
+    user.move(x, y)
+    user.frames(2)
+    assert user.viewport.gizmo.is_over
+    user.wheel(1.0)
+    user.rest(1.0)
+    assert user.editor.document.history.undo_label == "Zoom"
+    user.drag_at((x, y), (60.0, 0.0), button=2)
+    assert user.editor.document.history.undo_label == "Orbit" and user.undo_count == 2
+
+
+def test_the_bar_of_the_split_view_is_dragged(user: Desk) -> None:
+    user.run("Split view")
+    before = state(user.editor)
+    left, _, right, _ = user.picture
+    user.drag("split bar", (right - left) / 4)
+    after = state(user.editor)
+    assert changes(before, after) == {"preferences.display.split_position"}
+    assert after["preferences.display.split_position"] == pytest.approx(0.75, abs=0.01)
+    user.drag("split bar", right - left)
+    assert user.editor.preferences.display.split_position == 1.0
+    assert not user.null.requests and user.undo_count == 0
+
+
+def test_hidden_objects_have_no_gizmo(user: Desk) -> None:
+    user.editor.select(Selection(("red cube",)))
+    user.run("Hide")
+    assert not user.shows("gizmo")
+
+
+# ------------------------------------------------------------------------------------------- outliner
+
+
+def test_the_outliner_selects_hides_and_renames(user: Desk) -> None:
+    user.click("object lamp")
+    assert user.editor.selection.names == ("lamp",)
+    with user.held_keys("Ctrl"):
+        user.click("object red cube")
+    assert user.editor.selection.names == ("lamp", "red cube")
+    with user.held_keys("Shift"):
+        user.click("object floor")
+    assert set(user.editor.selection.names) == {"lamp", "red cube", "floor"}
+    assert user.editor.selection.active == "floor"
+    before = state(user.editor)
+    user.click("visible floor")
+    assert changes(before, state(user.editor)) == {"scene.objects.floor.visible"} and user.undo_count == 1
+    user.click("visible floor")
+    assert changes(before, state(user.editor)) == set()
+    user.open_field("object lamp")
+    user.key("Ctrl+A")
+    user.write("panel")
+    user.key("Enter")
+    assert user.scene.object("panel") and user.editor.selection.names == ("panel",)
+
+
+def test_the_search_leaves_what_fits(user: Desk) -> None:
+    before = state(user.editor)
+    user.click("Search")
+    user.write("L")
+    assert {o.name for o in SCENE.objects if user.shows(f"object {o.name}")} == {
+        "floor", "glass ball", "lamp",
+    }  # fmt: skip
+    user.write("zz")
+    assert not any(user.shows(f"object {o.name}") for o in SCENE.objects)
+    assert changes(before, state(user.editor)) == set()
+
+
+# ------------------------------------------------------------------------------ what the renderer tells
+
+
+def test_building_shows_a_bar_until_there_is_a_picture(user: Desk) -> None:
+    tell(user, Building(1, 5))
+    assert user.shows("building")
+    tell(user, Building(5, 5))
+    assert not user.shows("building")
+    tell(user, Building(1, 5))
+    tell(user, frame_of(user.editor.view))
+    assert not user.shows("building") and user.editor.frame is not None
+
+
+def test_a_problem_is_a_message_and_nothing_else(user: Desk) -> None:
+    tell(user, frame_of(user.editor.view))
+    before, frame = state(user.editor), user.editor.frame
+    tell(user, Problem("memory ran out; use a smaller image"))
+    assert changes(before, state(user.editor)) == {"messages"} and user.editor.frame is frame
+    assert user.texts() == ["memory ran out; use a smaller image"]
+    user.rest(1000.0)
+    assert len(user.texts()) == 1  # an error stays until it is dismissed
+    user.click("dismiss 0")
+    assert user.texts() == []
+
+
+def test_after_a_fatal_problem_the_scene_is_still_edited_and_restart_opens_the_device(user: Desk) -> None:
+    tell(user, Building(1, 3), Problem("the device is gone", fatal=True))
+    assert user.editor.device_failed and not user.shows("building") and user.texts() == ["the device is gone"]
+    user.run("Cube")
+    assert user.undo_count == 1 and user.devices == [None]
+    user.run("Restart")
+    assert user.devices == [None, None] and user.null.closed and not user.editor.device_failed
+    assert user.null.views[-1].scene == user.scene
+
+
+def test_another_device_is_opened(user: Desk) -> None:
+    user.editor.is_pinned = True
+    user.editor.change_device("other")
+    assert user.devices == [None, "other"] and user.null.closed and not user.editor.is_pinned
+
+
+def test_what_was_exported_is_said_for_a_while(user: Desk, tmp_path: Path) -> None:
+    tell(user, Exported(tmp_path))
+    assert user.texts() == [f"{tmp_path} is written"] and user.editor.messages.next_end is not None
+    user.rest(6.0)
+    assert user.texts() == [] and user.editor.messages.next_end is None
+
+
+def test_pinning_and_exporting_ask_the_renderer(user: Desk, tmp_path: Path) -> None:
+    tell(user, frame_of(user.editor.view))
+    user.panel("Method")
+    user.click("Pin this picture")
+    tell(user, replace(frame_of(user.editor.view), is_pinned=True))
+    user.click("Unpin")
+    user.editor.change_display(DisplaySettings(exposure=2.0, curve="filmic"))
+    path = tmp_path / "a.png"
+    actions.export_to(user.editor, path)
+    assert user.null.requests == [Pin(True), Pin(False), Export(path, True, 2.0, "filmic")]
+    with pytest.raises(InputError, match="png"):
+        actions.export_to(user.editor, tmp_path / "a.gif")
+
+
+def test_the_status_says_mode_samples_and_selection(user: Desk) -> None:
+    assert status_text(user.editor) == ""
+    tell(user, frame_of(user.editor.view, Mode.INCREMENTAL, 1234, 0.5))
+    user.editor.select(Selection(("lamp",)))
+    assert "Incremental" in status_text(user.editor) and "1,234" in status_text(user.editor)
+    assert "0.50000" in status_text(user.editor) and status_text(user.editor).endswith("lamp")
+    user.run("Pause")
+    user.run("Select all")
+    assert status_text(user.editor).startswith("Paused") and "5 objects" in status_text(user.editor)
+
+
+def test_every_panel_shows_a_frame_of_either_kind(user: Desk) -> None:
+    for split in (False, True):
+        user.editor.change_display(DisplaySettings(split=split))
+        for step in range(3):
+            frame = frame_of(user.editor.view, error=0.1 + step)
+            tell(user, frame)
+            for panel in ("Object", "Scene", "Render", "Method"):
+                user.panel(panel)
+        assert user.shows("Step time plot") and user.shows("Error plot")
+        assert set(user.workspace.records.errors) == ({"restart (left)", "spiral"} if split else {"spiral"})
+    user.panel("Render")
+    assert user.shows("mode") and user.shows("queue") and user.scene is SCENE
+
+
+def test_messages_are_said_once_and_the_oldest_go() -> None:
+    now = [0.0]
+    messages = Messages(lambda: now[0])
+    for text in ("a", "b", "a"):
+        messages.add(text, "error")
+    assert [m.text for m in messages.current()] == ["b", "a"]
+    for i in range(10):
+        messages.add(str(i), "warning")
+    assert len(messages.current()) == 6 and messages.next_end == 15.0
+    now[0] = 16.0
+    assert messages.current() == []
+
+
+def test_what_is_refused_leaves_everything(user: Desk) -> None:
+    before = state(user.editor)
+    for error in (InputError("a\nb"), DeviceError("c")):
+
+        def fail(error: Exception = error) -> None:
+            raise error
+
+        assert not user.editor.attempt(fail)
+    assert changes(before, state(user.editor)) == {"messages"} and user.texts() == ["a b", "c"]
+    with pytest.raises(ZeroDivisionError):
+        user.editor.attempt(lambda: 1 / 0)
+
+
+def test_another_document_starts_over(user: Desk) -> None:
+    from incpt.ui.editor.document import Document
+
+    user.editor.select(Selection(("lamp",)))
+    user.editor.point = (0.5, 0.5)
+    user.editor.start_over(Document(Scene(), name="x", warnings=("lost something",)))
+    assert user.editor.selection.names == () and user.editor.point is None
+    assert user.texts() == ["lost something"] and user.editor.title == "x - incpt"
+    user.frames(2)
+    assert user.null.views[-1].scene == Scene() and user.undo_count == 0
+
+
+# ------------------------------------------------------------------------------------- undo of anything
+
+
+NAMES = [o.name for o in SCENE.objects] + ["cube", "red cube.001", "lamp.001"]
+COMMANDS = [
+    "Duplicate", "Delete", "Hide", "Show all", "Select all", "Select none", "Reset transform", "Cube",
+    "Frame selected", "Reset camera", "Front", "Match window", "Local axes", "Tile grid", "Pause", "Depth",
+]  # fmt: skip
+steps = st.one_of(
+    st.tuples(st.just("command"), st.sampled_from(COMMANDS)),
+    st.tuples(st.just("select"), st.lists(st.sampled_from(NAMES), max_size=3).map(tuple)),
+    st.tuples(st.just("rename"), st.sampled_from(["a", "b", "lamp", ""])),
+    st.tuples(st.just("material"), st.sampled_from(["new", "copy", "delete", "assign"])),
+    st.tuples(st.just("move"), st.floats(-5, 5, allow_nan=False)),
+    st.tuples(st.just("drag"), st.integers(-60, 60)),
+    st.tuples(st.just("orbit"), st.integers(-60, 60)),
+    st.tuples(st.just("wheel"), st.sampled_from([-1.0, 1.0])),
+    st.tuples(st.just("undo"), st.integers(1, 3)),
+    st.tuples(st.just("redo"), st.integers(1, 3)),
+)
+
+
+def act(user: Desk, kind: str, value: Any) -> None:
+    if kind == "command":
+        user.run(value)
+    elif kind == "select":
+        user.editor.select(Selection(value))
+    elif kind in ("undo", "redo"):
+        for _ in range(value):
+            user.run(kind.capitalize())
+    elif kind == "orbit":
+        user.drag_at(user.at_picture(0.02, 0.02), (value, 0.0), button=2)
+    elif kind == "wheel":
+        user.move(*user.at_picture(0.02, 0.02))
+        user.wheel(value)
+        user.rest(1.0)
+    elif user.editor.selection.active is not None:
+        act_on(user, user.editor.selection.active, kind, value)
+    user.frame()
+
+
+def act_on(user: Desk, name: str, kind: str, value: Any) -> None:
+    editor = user.editor
+    material = editor.scene.object(name).material
+    if kind == "drag" and user.shows("Position X"):
+        user.drag("Position X", value)
+    elif kind == "move":
+        editor.propose(editor.scene.with_object(name, position=(value, 0, 0)), "Move")
+    elif kind == "rename":
+        editor.attempt(lambda: actions.rename_to(editor, name, value))
+    elif value == "new":
+        actions.new_material(editor)
+    elif value == "copy":
+        actions.duplicate_material(editor, material)
+    elif value == "delete":
+        editor.attempt(lambda: editor.propose(edits.delete_material(editor.scene, material), "Delete"))
+    elif value == "assign":
+        editor.propose(edits.assign_material(editor.scene, editor.selection.names, "glass"), "Assign")
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
+@given(st.lists(steps, min_size=4, max_size=40))
+def test_undo_and_redo_lead_through_the_same_scenes(sequence: list[tuple[str, Any]]) -> None:
+    with desk(SCENE, Preferences()) as user:
+        history = user.editor.document.history
+        for kind, value in sequence:
+            before, selected = user.scene, user.editor.selection.names
+            could_redo = history.can_redo
+            act(user, kind, value)
+            assert history.before is None
+            if kind not in ("undo", "redo") and user.scene != before:
+                # One step: undo leads back to scene and selection, redo to what came of it.
+                after, selected_after = user.scene, user.editor.selection.names
+                assert not history.can_redo
+                user.run("Undo")
+                assert user.scene == before and user.editor.selection.names == selected
+                user.run("Redo")
+                assert user.scene == after and user.editor.selection.names == selected_after
+            elif kind not in ("undo", "redo"):
+                assert history.can_redo == could_redo
+            assert all(name in user.scene.object_index for name in user.editor.selection)
+            assert user.null.views[-1].scene == user.scene
+        scenes = [user.scene]
+        while history.can_undo:
+            commands.run(user.editor, commands.command("Undo"))
+            scenes.append(user.scene)
+        assert user.scene == SCENE and not user.editor.document.is_dirty
+        for scene in scenes[-2::-1]:
+            commands.run(user.editor, commands.command("Redo"))
+            assert user.scene == scene

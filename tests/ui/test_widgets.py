@@ -1,0 +1,506 @@
+"""Every field of every panel, used as a user does: it changes exactly what it says and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import pytest
+from support.small_scenes import mixed_scene
+from support.ui_harness import Desk, changes, desk, places, state
+
+from incpt.scene.model import Scene
+from incpt.scene.selection import Selection
+from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
+from incpt.viewer.threaded import Pin, Restart
+
+SCENE = mixed_scene(size=(48, 32))
+PREFERENCES = Preferences(
+    display=DisplaySettings(overlay="spp"), snap=SnapSettings(enabled=True), navigation="blender"
+)
+RED, GREEN, BLUE = 0.12, 0.40, 0.66
+"""Where the components of a colour stand, of its width."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """A number: `place` is what changes, to `value` where `typed` is typed; `dragged` pixels to drag it."""
+
+    panel: str
+    label: str
+    place: str
+    typed: str
+    value: float
+    selected: str = "red cube"
+    dragged: float = 30.0
+    across: float = 0.5
+
+    def __str__(self) -> str:
+        return f"{self.panel}: {self.label} {self.place[-1]}"
+
+
+def vector(panel: str, label: str, place: str, selected: str = "red cube", names: str = "XYZ") -> list[Field]:
+    return [
+        Field(panel, f"{label} {name}", f"{place}.{i}", "0.625", 0.625, selected)
+        for i, name in enumerate(names)
+    ]
+
+
+def colour(panel: str, label: str, place: str, selected: str = "red cube") -> list[Field]:
+    # Of the lamp and the sky the greatest components are full, so they are dragged down.
+    return [
+        Field(panel, label, f"{place}.{i}", "0.25", 0.25, selected, -30.0, across)
+        for i, across in enumerate((RED, GREEN, BLUE))
+    ]
+
+
+CUBE, BALL, LAMP = "scene.objects.red cube", "glass ball", "lamp"
+FIELDS = [
+    *vector("Object", "Position", f"{CUBE}.position"),
+    *vector("Object", "Rotation", f"{CUBE}.rotation"),
+    *vector("Object", "Scale", f"{CUBE}.scale"),
+    *colour("Object", "Base colour", "scene.materials.red.base_color"),
+    Field("Object", "Metallic", "scene.materials.red.metallic", "0.25", 0.25),
+    Field("Object", "Roughness", "scene.materials.red.roughness", "0.25", 0.25, dragged=-30),
+    Field("Object", "Specular", "scene.materials.red.specular", "0.25", 0.25, dragged=-30),
+    Field("Object", "IOR", "scene.materials.red.ior", "2.5", 2.5),
+    Field("Object", "Transmission", "scene.materials.glass.transmission", "0.5", 0.5, BALL, -30),
+    *vector("Object", "Absorption", "scene.materials.glass.absorption", BALL, "RGB"),
+    Field("Object", "Priority", "scene.materials.glass.priority", "7", 7, BALL, 60),
+    *vector("Scene", "Camera", "scene.camera.position"),
+    *vector("Scene", "Target", "scene.camera.target"),
+    Field("Scene", "Field of view", "scene.camera.fov_y", "60", 60),
+    *colour("Scene", "Colour", "scene.environment.color"),
+    Field("Scene", "Intensity", "scene.environment.intensity", "2.5", 2.5),
+    Field("Scene", "Turn", "scene.environment.rotation_y", "-90", -90),
+    Field("Render", "NoR", "scene.settings.nor", "64", 64, dragged=60),
+    Field("Render", "Base NoR", "scene.settings.base_nor", "4", 4, dragged=60),
+    Field("Render", "Sample rate", "scene.settings.sample_rate", "4", 4, dragged=60),
+    Field("Render", "Bounces", "scene.settings.max_bounces", "9", 9, dragged=60),
+    Field("Render", "Glass bounces", "scene.settings.transmission_bounces", "3", 3, dragged=60),
+    Field("Render", "Seed", "scene.settings.seed", "12345", 12345, dragged=60),
+    Field("Render", "Width", "scene.settings.size.0", "100", 100, dragged=60),
+    Field("Render", "Height", "scene.settings.size.1", "70", 70, dragged=60),
+    Field("Render", "Target spp", "target_spp", "128", 128),
+    Field("Render", "Resolution", "preferences.resolution_scale", "50", 0.5),
+    Field("Render", "Step time", "preferences.step_ms", "20", 20),
+    Field("Render", "NoR in a drag", "preferences.drag_nor", "32", 32, dragged=60),
+    Field("Method", "Exposure", "preferences.display.exposure", "-1.5", -1.5),
+    Field("Method", "Opacity", "preferences.display.overlay_opacity", "0.25", 0.25),
+    Field("Object", "Step of moves", "preferences.snap.move_m", "0.5", 0.5),
+    Field("Object", "Step of turns", "preferences.snap.rotate_deg", "45", 45),
+    Field("Object", "Step of scale", "preferences.snap.scale", "0.5", 0.5),
+]
+
+CHOICES = [
+    ("Object", "Material", "Glass", "glass", f"{CUBE}.material"),
+    ("Object", "Gizmo", "Rotate", "rotate", "tool.operation"),
+    ("Object", "Axes", "The object's axes", "local", "tool.space"),
+    ("Render", "Strategy", "Restart", "restart", "scene.settings.strategy"),
+    ("Render", "Tile size", "32 × 32", 32, "scene.settings.tile_size"),
+    ("Method", "Curve", "Filmic", "filmic", "preferences.display.curve"),
+    ("Method", "Overlay", "Normals", "normals", "preferences.display.overlay"),
+]
+
+CHECKBOXES = [
+    ("Object", "Double sided", "scene.materials.lamp.double_sided"),
+    ("Object", "Snap", "preferences.snap.enabled"),
+    ("Method", "Tile grid", "preferences.display.tile_grid"),
+    ("Method", "Outline", "preferences.display.outline"),
+    ("Method", "Split view", "preferences.display.split"),
+]
+
+BUTTONS = [
+    ("Object", "Position", {f"{CUBE}.position.1"}),
+    ("Object", "Rotation", {f"{CUBE}.rotation.1"}),
+    ("Object", "Scale", {f"scene.objects.floor.scale.{i}" for i in (0, 2)}),
+    ("Object", "Rename…##material", {"dialog"}),
+    ("Object", "Delete##material", {"messages"}),
+    ("Scene", "Remove##image", {"scene.environment.image"}),
+    ("Scene", "Choose…##image", {"dialog"}),
+    ("Render", "Pause", {"paused"}),
+    ("Render", "Restart", set()),
+]
+
+SECTIONS = {"Transform", "Gizmo", "Material", "Transmission", "Emission", "Camera", "Environment"}
+SECTIONS |= {"Settings of the scene", "Display", "Measurements"}
+SHOWN_ONLY = {"Image", "Step time plot", "Device"}
+ELSEWHERE = {
+    "Name", "Uniform scale", "Emission colour", "Emission strength", "New##material", "Duplicate##material",
+    "Frame selected##camera", "Reset##camera", "Pin this picture",
+}  # fmt: skip
+"""Tested below, one by one."""
+
+
+@pytest.fixture
+def user() -> Iterator[Desk]:
+    with desk(SCENE, PREFERENCES) as made:
+        made.editor.select(Selection(("red cube",)))
+        made.frames(2)
+        yield made
+
+
+def turn_to(user: Desk, panel: str, selected: str = "red cube") -> None:
+    user.panel(panel)
+    user.editor.select(Selection((selected,)))
+    user.frames(2)
+    if panel == "Object":
+        if not user.shows("Axes"):
+            user.click("Gizmo")
+        for section, field in (("Transmission", "Priority"), ("Emission", "Double sided")):
+            if not user.shows(field):
+                user.click(section)
+        if user.shows("Uniform scale") and user.workspace._is_uniform:
+            user.click("Uniform scale")
+
+
+def is_scene(place: str) -> bool:
+    return place.startswith("scene.")
+
+
+def assert_one_edit(user: Desk, before: Scene) -> None:
+    """The change is one entry of the history, and undo and redo lead from one to the other."""
+    after = user.scene
+    assert user.undo_count == 1
+    user.key("Ctrl+Z")
+    assert user.scene == before and user.null.views[-1].scene == before
+    user.key("Ctrl+Shift+Z")
+    assert user.scene == after and user.null.views[-1].scene == after
+
+
+@pytest.mark.parametrize("field", FIELDS, ids=str)
+def test_a_number_is_typed(user: Desk, field: Field) -> None:
+    turn_to(user, field.panel, field.selected)
+    before, scene = state(user.editor), user.scene
+    user.type(field.label, field.typed, across=field.across)
+    after = state(user.editor)
+    assert changes(before, after) == {field.place}
+    assert after[field.place] == pytest.approx(field.value, rel=1e-6)
+    if is_scene(field.place):
+        assert_one_edit(user, scene)
+    else:
+        assert user.scene is scene and user.undo_count == 0
+
+
+@pytest.mark.parametrize("field", FIELDS, ids=str)
+def test_a_number_is_dragged(user: Desk, field: Field) -> None:
+    turn_to(user, field.panel, field.selected)
+    before, scene = state(user.editor), user.scene
+    user.hold_at(user.place(field.label, field.across), (field.dragged, 0.0))
+    during = state(user.editor)
+    assert changes(before, during) == {field.place}
+    assert (during[field.place] > (before[field.place] or 0)) == (field.dragged > 0)
+    if is_scene(field.place):
+        assert user.editor.view.before == scene
+    user.release()
+    user.frame()
+    assert user.editor.view.before is None and changes(during, state(user.editor)) == set()
+    if is_scene(field.place):
+        assert_one_edit(user, scene)
+    else:
+        assert user.scene is scene and user.undo_count == 0
+
+
+@pytest.mark.parametrize(
+    "field", [f for f in FIELDS if is_scene(f.place) and f.across in (0.5, RED)], ids=str
+)
+def test_a_drag_is_given_up_by_escape(user: Desk, field: Field) -> None:
+    turn_to(user, field.panel, field.selected)
+    before, scene, (x, y) = state(user.editor), user.scene, user.place(field.label, field.across)
+    user.hold_at((x, y), (field.dragged, 0.0))
+    assert user.scene != scene
+    user.key("Escape")
+    assert changes(before, state(user.editor)) == set()
+    user.move(x + 2 * field.dragged, y)
+    user.move(x + 3 * field.dragged, y)
+    user.release()
+    user.frames(2)
+    assert changes(before, state(user.editor)) == set() and user.undo_count == 0
+
+
+@pytest.mark.parametrize("field", FIELDS, ids=str)
+def test_typing_is_given_up_by_escape(user: Desk, field: Field) -> None:
+    turn_to(user, field.panel, field.selected)
+    before = state(user.editor)
+    user.type(field.label, field.typed, end="Escape", across=field.across)
+    assert changes(before, state(user.editor)) == set() and user.undo_count == 0
+
+
+@pytest.mark.parametrize("typed", ["nan", "inf", "-inf", "abc", "--", "", "."])
+@pytest.mark.parametrize("field", FIELDS[:2] + FIELDS[-8:], ids=str)
+def test_what_is_no_number_changes_nothing(user: Desk, field: Field, typed: str) -> None:
+    turn_to(user, field.panel, field.selected)
+    before = state(user.editor)
+    user.type(field.label, typed, across=field.across)
+    is_remarked = typed in ("nan", "inf", "-inf") and not isinstance(before[field.place], int)
+    assert changes(before, state(user.editor)) == ({"messages"} if is_remarked else set())
+    assert user.undo_count == 0
+
+
+@pytest.mark.parametrize("typed", ["1e999", "-1e999", "-1e12", "1e12"])
+@pytest.mark.parametrize(
+    "field",
+    [f for f in FIELDS if f.panel in ("Object", "Scene") and is_scene(f.place) and f.label != "Priority"],
+    ids=str,
+)
+def test_a_number_out_of_range_is_refused_with_a_remark(user: Desk, field: Field, typed: str) -> None:
+    turn_to(user, field.panel, field.selected)
+    before = state(user.editor)
+    user.type(field.label, typed, across=field.across)
+    after = state(user.editor)
+    assert changes(before, after) == {"messages"} and user.undo_count == 0
+    (remark,) = after["messages"]
+    assert (
+        field.place.split(".")[3 if "objects" in field.place or "materials" in field.place else 2] in remark
+    )
+    user.rest(1.0)
+    assert user.texts() == [remark]  # long enough to be read
+    user.rest(30.0)
+    assert user.texts() == []
+
+
+@pytest.mark.parametrize(
+    ("label", "typed"), [("Scale X", "0"), ("Roughness", "1.01"), ("Metallic", "-0.01"), ("IOR", "0.9")]
+)
+def test_just_outside_is_outside(user: Desk, label: str, typed: str) -> None:
+    turn_to(user, "Object")
+    before = state(user.editor)
+    user.type(label, typed)
+    assert changes(before, state(user.editor)) == {"messages"}
+
+
+@pytest.mark.parametrize("typed", ["1e999", "-1e999", "99999999999", "-99999999999"])
+@pytest.mark.parametrize("field", [f for f in FIELDS if f.panel in ("Render", "Method")], ids=str)
+def test_settings_stay_in_their_range(user: Desk, field: Field, typed: str) -> None:
+    turn_to(user, field.panel, field.selected)
+    before = state(user.editor)
+    user.type(field.label, typed, across=field.across)
+    changed = changes(before, state(user.editor))
+    if before[field.place] is None or isinstance(before[field.place], int):
+        # Brought into its range: scene and preferences refuse to be made with another value.
+        assert changed <= {field.place}
+    else:
+        assert changed == {"messages"}
+
+
+@pytest.mark.parametrize(("panel", "label", "text", "value", "place"), CHOICES)
+def test_a_choice_is_made(user: Desk, panel: str, label: str, text: str, value: object, place: str) -> None:
+    turn_to(user, panel)
+    before, scene = state(user.editor), user.scene
+    user.choose(label, text if label != "Material" else "glass")
+    after = state(user.editor)
+    assert changes(before, after) == {place} and after[place] == value
+    if is_scene(place):
+        assert_one_edit(user, scene)
+    else:
+        assert user.scene is scene and user.undo_count == 0
+
+
+@pytest.mark.parametrize(("panel", "label", "place"), CHECKBOXES)
+def test_a_box_is_checked(user: Desk, panel: str, label: str, place: str) -> None:
+    turn_to(user, panel, "lamp")
+    before, scene = state(user.editor), user.scene
+    user.click(label)
+    after = state(user.editor)
+    assert changes(before, after) == {place} and after[place] is not before[place]
+    if is_scene(place):
+        assert_one_edit(user, scene)
+    user.click(label)
+    assert changes(before, state(user.editor)) == set()
+
+
+@pytest.mark.parametrize(("panel", "label", "changed"), BUTTONS)
+def test_a_button_does_one_thing(user: Desk, panel: str, label: str, changed: set[str]) -> None:
+    turn_to(user, panel, "floor" if label == "Scale" else "red cube")
+    before, scene = state(user.editor), user.scene
+    user.click(label)
+    assert changes(before, state(user.editor)) == changed
+    if any(map(is_scene, changed)):
+        assert_one_edit(user, scene)
+    assert [type(r) for r in user.null.requests] == ([Restart] if label == "Restart" else [])
+
+
+def test_every_widget_of_the_panels_is_tested(user: Desk) -> None:
+    tested = {f.label for f in FIELDS} | {label for _, label, *_ in (*CHOICES, *CHECKBOXES, *BUTTONS)}
+    shown: set[str] = set()
+    for panel, selected in (
+        ("Object", "red cube"), ("Object", "glass ball"), ("Object", "lamp"),
+        ("Scene", "lamp"), ("Render", "lamp"), ("Method", "lamp"),
+    ):  # fmt: skip
+        turn_to(user, panel, selected)
+        shown |= {
+            name
+            for name in places.names()
+            if not name.startswith(("menu ", "object ", "visible "))
+            and name not in ("Search", "status", "picture", "gizmo")
+        }
+    assert shown - tested - SECTIONS - SHOWN_ONLY == ELSEWHERE
+    assert tested - shown == set()
+
+
+# --------------------------------------------------------------------------------- what is special in some
+
+
+def test_a_uniform_scale_keeps_proportions(user: Desk) -> None:
+    user.editor.select(Selection(("floor",)))
+    user.frames(2)
+    assert user.scene.object("floor").scale == (8, 1, 8)
+    user.type("Scale Y", "0.5")
+    assert user.scene.object("floor").scale == (4, 0.5, 4)
+    user.drag("Scale Y", 30)
+    x, y, z = user.scene.object("floor").scale
+    assert y > 0.5 and (x, z) == pytest.approx((8 * y, 8 * y))
+    user.click("Uniform scale")
+    user.type("Scale Y", "3")
+    assert user.scene.object("floor").scale == (x, 3, z) and user.undo_count == 3
+
+
+def test_a_radiance_is_a_colour_and_a_strength(user: Desk) -> None:
+    user.editor.select(Selection(("lamp",)))
+    user.frames(2)
+    before, scene = state(user.editor), user.scene
+    user.type("Emission strength", "24")
+    places_of = {f"scene.materials.lamp.emission.{i}" for i in range(3)}
+    assert changes(before, state(user.editor)) == places_of
+    assert user.scene.materials["lamp"].emission == pytest.approx((24, 22, 20))
+    user.type("Emission colour", "0.5", across=BLUE)
+    assert user.scene.materials["lamp"].emission == pytest.approx((24, 22, 12))
+    user.drag("Emission strength", 30)
+    r, g, b = user.scene.materials["lamp"].emission
+    assert r > 24 and (g / r, b / r) == pytest.approx((22 / 24, 0.5)) and user.undo_count == 3
+    for _ in range(3):
+        user.key("Ctrl+Z")
+    assert user.scene == scene
+    user.type("Emission strength", "1e999")
+    assert user.scene is scene and "emission" in user.texts()[0]
+    user.type("Emission strength", "-3")
+    assert user.scene == scene
+
+
+def test_tabbing_makes_two_entries(user: Desk) -> None:
+    user.open_field("Position X")
+    user.key("Ctrl+A")
+    user.write("2.5")
+    assert user.scene == SCENE  # before it is ended
+    user.key("Tab")
+    assert user.scene.object("red cube").position == (2.5, 0.5, 0)
+    user.key("Ctrl+A")
+    user.write("1.25")
+    user.key("Enter")
+    assert user.scene.object("red cube").position == (2.5, 1.25, 0) and user.undo_count == 2
+    user.key("Ctrl+Z")
+    assert user.scene.object("red cube").position == (2.5, 0.5, 0)
+
+
+def test_typing_ends_by_a_click_elsewhere(user: Desk) -> None:
+    user.open_field("Position X")
+    user.key("Ctrl+A")
+    user.write("2.5")
+    user.click("Position Z")
+    assert user.scene.object("red cube").position == (2.5, 0.5, 0) and user.undo_count == 1
+
+
+def test_letters_that_are_typed_are_no_commands(user: Desk) -> None:
+    before = state(user.editor)
+    user.open_field("Position X")
+    for keys in ("G", "R", "S", "A", "H", "Delete", "F6"):
+        user.key(keys)
+    user.key("Escape")
+    assert changes(before, state(user.editor)) == set()
+
+
+def test_two_drags_of_one_field_are_two_entries(user: Desk) -> None:
+    user.drag("Position X", 30)
+    user.drag("Position X", 30)
+    user.drag("Position Y", 30)
+    assert user.undo_count == 3
+
+
+def test_a_drag_back_to_the_start_is_no_entry(user: Desk) -> None:
+    x, y = user.place("Position X")
+    user.hold_at((x, y), (40, 0))
+    user.move(x, y)
+    user.release()
+    user.frame()
+    assert user.scene == SCENE and user.undo_count == 0
+
+
+def test_undo_in_a_drag_ends_it(user: Desk) -> None:
+    x, y = user.place("Position X")
+    user.hold_at((x, y), (40, 0))
+    user.key("Ctrl+Z")
+    assert user.scene == SCENE
+    user.move(x + 90, y)
+    user.release()
+    user.frame()
+    assert user.scene == SCENE
+
+
+def test_the_name_is_typed(user: Desk) -> None:
+    before = state(user.editor)
+    user.type("Name", "  a   cube ")
+    assert user.editor.selection.names == ("a cube",) and user.undo_count == 1
+    assert user.scene.object("a cube") == replace(SCENE.object("red cube"), name="a cube")
+    user.key("Ctrl+Z")
+    assert changes(before, state(user.editor)) == set()
+    for name, said in (("lamp", "taken"), ("  ", "empty")):
+        user.type("Name", name)
+        assert user.scene == SCENE and said in user.texts()[-1]
+    user.type("Name", "grün")
+    assert user.editor.selection.names == ("grün",)
+
+
+def test_materials_of_the_selection(user: Desk) -> None:
+    user.editor.select(Selection(("lamp", "red cube")))
+    user.frames(2)
+    user.click("New##material")
+    assert {user.scene.object(n).material for n in ("lamp", "red cube")} == {"material"}
+    user.choose("Material", "glass")
+    assert {user.scene.object(n).material for n in ("lamp", "red cube")} == {"glass"}
+    user.click("Duplicate##material")
+    assert user.scene.materials["glass.001"] == SCENE.materials["glass"]
+    assert user.scene.object("red cube").material == "glass.001" and user.undo_count == 3
+    assert user.scene.object("glass ball").material == "glass"
+    user.type("Roughness", "0.5")
+    assert user.scene.materials["glass"] == SCENE.materials["glass"]
+    user.click("Delete##material")
+    assert "glass.001" in user.scene.materials and "give them another one first" in user.texts()[-1]
+    while user.editor.document.history.can_undo:
+        user.key("Ctrl+Z")
+    assert user.scene == SCENE
+
+
+def test_a_material_is_renamed(user: Desk) -> None:
+    user.click("Rename…##material")
+    user.key("Ctrl+A")
+    user.write("paint")
+    user.key("Enter")
+    assert user.editor.dialog is None and user.scene.object("red cube").material == "paint"
+    assert user.scene.materials["paint"] == SCENE.materials["red"] and "red" not in user.scene.materials
+
+
+def test_camera_buttons(user: Desk) -> None:
+    turn_to(user, "Scene")
+    user.click("Frame selected##camera")
+    assert user.scene.camera != SCENE.camera and user.scene.camera.target == pytest.approx((0, 0.5, 0))
+    user.type("Field of view", "70")
+    user.click("Reset##camera")
+    assert user.scene == SCENE and user.undo_count == 3
+
+
+def test_a_number_that_no_widget_offers_stays(user: Desk) -> None:
+    settings = replace(SCENE.settings, seed=(1 << 32) - 1, base_nor=1 << 16, sample_rate=4096, tile_size=24)
+    scene = replace(SCENE, settings=settings)
+    user.editor.propose(scene, "x")
+    turn_to(user, "Render")
+    assert user.scene == scene
+    user.type("Bounces", "1")
+    assert user.scene.settings == replace(settings, max_bounces=1)
+
+
+def test_pinning_asks_the_renderer(user: Desk) -> None:
+    turn_to(user, "Method")
+    user.click("Pin this picture")
+    assert not user.editor.is_pinned and user.null.requests == []  # there is no picture yet
+    user.run("Pin reference")
+    assert user.null.requests == [] and Pin(True) not in user.null.requests

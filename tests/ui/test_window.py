@@ -1,0 +1,320 @@
+"""The editor in a real window, worked by mouse and keyboard. window.py says where pictures of it are kept."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+from support import window
+from support.window import is_answered, keep, projected
+
+from incpt.benchmarks.kit import desktop
+from incpt.benchmarks.kit.desktop import Hand
+from incpt.formats import registry
+from incpt.render.modes import Mode
+
+CUBE = (-0.3, 0.5, 0.6)
+
+
+@pytest.fixture(scope="module")
+def display() -> Iterator[str]:
+    window.require_display()
+    with desktop.virtual_display(window.DISPLAY_SIZE) as name:
+        yield name
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return window.scene_file(tmp_path)
+
+
+@pytest.fixture
+def hand(display: str, file: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hand]:
+    with window.opened(file, monkeypatch) as hand:
+        yield hand
+
+
+def pick(hand: Hand, name: str, button: int = 3) -> None:
+    """Click the middle of an object in the picture."""
+    scene = hand.app.editor.scene
+    x, y = projected(scene, scene.object(name).position)
+    hand.click(hand.in_picture(x, y), button)
+    hand.pump(lambda: hand.app.editor.selection.active == name, timeout=20)
+
+
+def answer_path(hand: Hand, path: Path) -> None:
+    hand.type_into("Path", str(path))
+    hand.pump(lambda: hand.app.editor.dialog is None, timeout=20)
+
+
+def read_exr(path: Path) -> dict[str, np.ndarray]:
+    channels = OpenEXR.File(str(path)).channels()
+    return {name: np.asarray(channel.pixels) for name, channel in channels.items()}
+
+
+def settled(hand: Hand) -> None:
+    hand.pump(lambda: is_answered(hand), timeout=30)
+
+
+# ------------------------------------------------------------------------------------ selecting, editing
+
+
+def test_a_right_click_selects_and_a_click_on_nothing_deselects(hand: Hand) -> None:
+    from incpt.ui.widgets import places
+
+    editor = hand.app.editor
+    before = keep(hand, "1-start")
+    assert editor.frame.pictures[-1].mode is Mode.REFINE
+    assert "Position X" not in places.names()
+    pick(hand, "red cube")
+    after = keep(hand, "2-picked")
+    assert "Position X" in places.names()
+    x, y = map(round, hand.in_picture(*projected(editor.scene, CUBE)))
+    box = slice(y - 70, y + 70), slice(x - 70, x + 70)
+    changed = np.abs(after[box].astype(int) - before[box]).max(axis=-1) > 60
+    assert changed.sum() > 150, "neither outline nor gizmo"
+    with hand.holding("ctrl"):
+        pick(hand, "blue ball", button=1)
+    assert editor.selection.names == ("red cube", "blue ball")
+    hand.click(hand.in_picture(0.5, 0.03), button=3)
+    hand.pump(lambda: not editor.selection, timeout=20)
+    assert not editor.document.is_dirty and not editor.document.history.can_undo
+
+
+def test_values_are_dragged_and_typed_undone_saved_and_opened_again(
+    hand: Hand, file: Path, tmp_path: Path
+) -> None:
+    editor = hand.app.editor
+    opened = editor.scene
+    pick(hand, "red cube")
+
+    modes, steps = set(), []
+
+    def watch() -> None:
+        modes.add(editor.frame.pictures[-1].mode)
+        steps.append(editor.document.history.before is not None)
+
+    x, y = hand.middle("Rotation Y")
+    hand.drag((x, y), (x + 40, y), between=watch)
+    turned = editor.scene
+    assert turned.object("red cube").rotation[1] > 40 and Mode.INCREMENTAL in modes and any(steps)
+    assert turned.object("red cube").position == CUBE
+    settled(hand)
+
+    hand.type_into("Position X", "0.35")
+    moved = editor.scene
+    assert moved.object("red cube").position == (pytest.approx(0.35), 0.5, 0.6)
+    hand.type_into("Scale Y", "0")
+    assert editor.scene == moved, "a scale of 0 is refused, and the field keeps the last good value"
+    settled(hand)
+    keep(hand, "3-edited")
+
+    hand.key("ctrl+z")
+    assert editor.scene == turned
+    hand.key("ctrl+z")
+    assert editor.scene == opened and not editor.document.is_dirty
+    assert editor.document.history.undo_label is None, "a drag is one entry"
+    hand.key("ctrl+shift+z")
+    hand.key("ctrl+shift+z")
+    assert editor.scene == moved and editor.title == "table.toml (edited) - incpt"
+
+    hand.key("ctrl+shift+s")
+    keep(hand, "4-save-as")
+    answer_path(hand, tmp_path / "moved.toml")
+    assert registry.load(tmp_path / "moved.toml") == moved
+    assert registry.load(file) == opened, "save as leaves the first file alone"
+    assert editor.title == "moved.toml - incpt"
+
+    hand.key("ctrl+n")
+    assert len(editor.scene.objects) == 2
+    hand.key("ctrl+o")
+    answer_path(hand, tmp_path / "moved.toml")
+    assert editor.scene == moved and not editor.document.history.can_undo
+    hand.pump(lambda: is_answered(hand) and window.is_whole(hand))
+    keep(hand, "5-opened-again")
+
+
+def test_the_gizmo_moves_the_object_and_the_exported_picture_shows_it_there(
+    hand: Hand, tmp_path: Path
+) -> None:
+    editor = hand.app.editor
+    pick(hand, "red cube")
+    x, y = hand.middle("gizmo")
+    hand.drag((x + 45, y), (x + 100, y))
+    moved = editor.scene.object("red cube").position
+    assert moved[0] > CUBE[0] + 0.3 and moved[1:] == pytest.approx(CUBE[1:], abs=1e-5)
+    assert editor.document.history.undo_label == "Move" and editor.selection.names == ("red cube",)
+    hand.pump(lambda: is_answered(hand) and editor.frame.pictures[-1].mode is Mode.REFINE)
+    keep(hand, "6-moved-by-gizmo")
+
+    picture = tmp_path / "moved.exr"
+    hand.key("ctrl+e")
+    answer_path(hand, picture)
+    hand.pump(lambda: any(m.level == "done" for m in editor.messages.current()), timeout=60)
+    channels = read_exr(picture)
+    rows, columns = np.nonzero(channels["object_id"] == 1)
+    width, height = window.PICTURE_SIZE
+    middle = (columns.mean() + 0.5) / width, (rows.mean() + 0.5) / height
+    assert middle == pytest.approx(tuple(projected(editor.scene, moved)), abs=0.02)
+    radiance = channels["RGB"]
+    assert (radiance[rows, columns, 0] > 2 * radiance[rows, columns, 2]).mean() > 0.95, (
+        "the cube is red there"
+    )
+    x0, y0 = projected(editor.scene, CUBE) * (width, height)
+    left_behind = radiance[round(y0) - 4 : round(y0) + 4, round(x0) - 14 : round(x0) - 8].mean(axis=(0, 1))
+    assert left_behind[0] < 1.3 * left_behind[2], "the table is grey where the cube was"
+    assert {"normal.X", "depth.Z", "object_id"} < set(channels) and any("albedo" in n for n in channels)
+
+
+def test_tiles_far_from_an_edit_keep_their_samples(hand: Hand) -> None:
+    editor = hand.app.editor
+    hand.pump(lambda: editor.frame.pictures[-1].tile_spp.min() >= 4)
+    hand.key("F5")
+    hand.pump(lambda: editor.frame.resting)
+    before = editor.frame.pictures[-1]
+    pick(hand, "red cube")
+    hand.type_into("Position Z", "0.9")
+    settled(hand)
+    assert editor.frame.resting and np.array_equal(editor.frame.pictures[-1].image, before.image)
+
+    seen = []
+
+    def note() -> bool:
+        picture = editor.frame.pictures[-1]
+        if picture.mode is Mode.INCREMENTAL and picture.queue_done > 0:
+            seen.append(picture)
+        return picture.mode is Mode.REFINE
+
+    hand.key("F5")
+    hand.pump(note)
+    partly = [picture for picture in seen if picture.queue_done < len(picture.queue) // 2]
+    assert partly, "the queue was never seen on its way"
+    for picture in partly:
+        done = np.zeros(picture.grid.count, bool)
+        done[picture.queue[: picture.queue_done]] = True
+        tile_of_pixels = picture.grid.tile_of_pixels()
+        kept = ~picture.replaced[tile_of_pixels]
+        assert np.array_equal(picture.image[kept], before.image[kept])
+        assert np.array_equal(picture.tile_spp[~done], before.tile_spp[~done])
+        assert (picture.tile_spp[done] == editor.scene.settings.nor).all()
+    first = partly[0].queue[0]
+    column, row = np.array(projected(editor.scene, (-0.3, 0.5, 0.9))) * window.PICTURE_SIZE // window.TILE
+    assert abs(first % before.grid.columns - column) <= 2 and abs(first // before.grid.columns - row) <= 2
+
+
+# ------------------------------------------------------------------------------------------ camera, display
+
+
+def test_the_middle_button_orbits_and_undo_goes_back(hand: Hand) -> None:
+    editor = hand.app.editor
+    camera = editor.scene.camera
+    previews = []
+    start, end = hand.in_picture(0.4, 0.5), hand.in_picture(0.6, 0.45)
+    hand.drag(start, end, button=2, between=lambda: previews.append(editor.frame.is_preview))
+    turned = editor.scene.camera
+    distance = np.linalg.norm(np.subtract(camera.position, camera.target))
+    assert turned.position != camera.position and turned.target == camera.target
+    assert np.linalg.norm(np.subtract(turned.position, turned.target)) == pytest.approx(distance)
+    hand.pump(lambda: is_answered(hand) and window.is_whole(hand))
+    assert editor.frame.view.scene.camera == turned
+    keep(hand, "7-orbited")
+    hand.key("ctrl+z")
+    assert editor.scene.camera == camera and not editor.document.history.can_undo
+
+
+def test_the_split_view_shows_both_strategies_and_its_bar_is_dragged(hand: Hand, file: Path) -> None:
+    editor = hand.app.editor
+    hand.key("F6")
+    hand.pump(lambda: len(editor.frame.pictures) == 2)
+    pick(hand, "blue ball")
+    hand.type_into("Position X", "1.2")
+    hand.pump(lambda: is_answered(hand) and all((p.tile_spp > 0).all() for p in editor.frame.pictures))
+    assert [picture.strategy for picture in editor.frame.pictures] == ["restart", "spiral"]
+    left, right = (picture.image[..., :3].mean(axis=(0, 1)) for picture in editor.frame.pictures)
+    assert left == pytest.approx(right, rel=0.05), "both sides show the same scene"
+    assert editor.frame.pictures[0].seconds > 0
+    bar, top, _, bottom = hand.place("split bar")
+    hand.drag((bar, (top + bottom) / 2), (bar - 120, (top + bottom) / 2))
+    picture_left, _, picture_right, _ = hand.place("picture")
+    position = (bar - 120 - picture_left) / (picture_right - picture_left)
+    assert editor.preferences.display.split_position == pytest.approx(position, abs=0.01)
+    keep(hand, "8-split")
+    hand.key("F6")
+    hand.pump(lambda: len(editor.frame.pictures) == 1)
+    assert registry.load(file) != editor.scene and editor.document.history.undo_label == "Transform"
+
+
+# ------------------------------------------------------------------------------------------------- closing
+
+
+def test_closing_asks_about_unsaved_changes(hand: Hand, file: Path) -> None:
+    editor = hand.app.editor
+    pick(hand, "grey drum")
+    hand.key("Delete")
+    assert "grey drum" not in {o.name for o in editor.scene.objects}
+    hand.key("ctrl+q")
+    keep(hand, "9-question")
+    hand.click("Cancel")
+    assert editor.dialog is None and not editor.is_closing
+    hand.close_window()
+    assert editor.dialog is not None and not editor.is_closing
+    hand.click("Save")
+    assert editor.is_closing and registry.load(file) == editor.scene
+
+
+def test_the_editor_runs_as_a_program_of_its_own(display: str, file: Path, tmp_path: Path) -> None:
+    environment = {**os.environ, "INCPT_CONFIG_DIR": str(tmp_path / "configuration")}
+    command = [sys.executable, "-m", "incpt", "edit", str(file)]
+    program = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
+    try:
+        found = wait_for_window(program, "table.toml - incpt")
+        desktop.ask_to_close(int(found))
+        _, errors = program.communicate(timeout=60)
+    finally:
+        program.kill()
+    assert program.returncode == 0 and errors == ""
+    assert (tmp_path / "configuration" / "preferences.toml").is_file()
+
+
+def wait_for_window(program: subprocess.Popen[str], title: str) -> str:
+    end = time.monotonic() + 60
+    while time.monotonic() < end and program.poll() is None:
+        search = ["xdotool", "search", "--name", f"^{title}$"]
+        found = subprocess.run(search, check=False, capture_output=True, text=True, timeout=20)
+        if found.stdout.strip():
+            return found.stdout.split()[0]
+        time.sleep(0.1)
+    raise AssertionError(f"no window {title!r}; status {program.poll()}")
+
+
+def run_editor(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "incpt", "edit", *arguments],
+        env=os.environ | environment,
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+
+
+def test_a_missing_file_is_one_line_and_status_2(display: str, tmp_path: Path) -> None:
+    result = run_editor("missing.toml", INCPT_CONFIG_DIR=str(tmp_path))
+    assert result.returncode == 2 and result.stdout == ""
+    (line,) = result.stderr.splitlines()
+    assert "missing.toml" in line
+
+
+def test_no_display_is_one_line_and_status_1(file: Path, tmp_path: Path) -> None:
+    window.require_display()
+    result = run_editor(str(file), DISPLAY="", WAYLAND_DISPLAY="", INCPT_CONFIG_DIR=str(tmp_path))
+    assert result.returncode == 1
+    (line,) = result.stderr.splitlines()
+    assert "display" in line

@@ -1,0 +1,1 @@
+"""Commands: the table of them, what they do, their keys, and the menus."""

@@ -1,0 +1,1 @@
+"""Dialogs: what stands over everything else until it is answered."""

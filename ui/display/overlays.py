@@ -1,0 +1,219 @@
+"""What can be laid over the picture, as small images: the queue, tiles already replaced, samples per pixel,
+and what the rays of the pixel centres hit. Pure numpy; `display` stretches and blends them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from incpt.render.first_hits import Aovs
+    from incpt.viewer.viewer import Picture
+
+Pixels = npt.NDArray[np.uint8]
+Color = tuple[int, int, int]
+
+NEEDS_AOVS = frozenset({"object_ids", "normals", "albedo", "depth"})
+"""Overlays that want first-hit images: a View with `aovs`."""
+
+_DONE_ALPHA, _WAITING_ALPHA = 90, 255
+_REPLACED = (70, 200, 140, 150)
+_LEAST_SPP_RANGE = 4.0
+_DEPTH_PERCENTILES = (1.0, 99.0)
+_GOLDEN_TURN = math.tau * 0.6180339887498949
+
+
+def _table(text: str) -> npt.NDArray[np.float64]:
+    return np.array([[int(word[i : i + 2], 16) for i in (0, 2, 4)] for word in text.split()], np.float64)
+
+
+# Colours at equal distances of the maps by S. van der Walt and N. Smith (matplotlib, 2015; CC0). Between
+# them, straight lines stay within 4 of 255 of the maps themselves.
+VIRIDIS = _table("440154 472d7b 3b528b 2c728e 21918c 28ae80 5ec962 addc30 fde725")
+# Inferno without its first quarter, which is so dark that nothing would be seen beneath.
+HEAT = _table("57106e 8a226a bc3754 e45a31 f98e09 f9cb35 fcffa4")
+
+
+@dataclass(frozen=True, eq=False)
+class Overlay:
+    """An image to be laid over a picture.
+
+    image        (h, w, 4) uint8, sRGB with straight alpha, row 0 on top.
+    extent_px    width and height of what it spans, from the picture's top left corner, in pixels of the
+                 picture: that of its tiles, so beyond the edge where tiles are cut, or of the picture.
+    legend       values and their colours, least first.
+    numbers      (n,) numbers to be written at `numbers_at` (n, 2), (x, y) in pixels of the picture.
+    """
+
+    image: Pixels
+    extent_px: tuple[int, int]
+    legend: tuple[tuple[str, Color], ...] = ()
+    numbers: npt.NDArray[np.int64] | None = None
+    numbers_at: npt.NDArray[np.float64] | None = None
+
+
+def build(kind: str, picture: Picture, aovs: Aovs | None) -> Overlay | None:
+    """The overlay of that kind, one of preferences.OVERLAYS. None for "none", and where first-hit images are
+    wanted that are not there yet."""
+    if kind == "queue":
+        return _queue(picture)
+    if kind == "replaced":
+        return _replaced(picture)
+    if kind == "spp":
+        return _spp(picture)
+    if aovs is None or kind not in NEEDS_AOVS:
+        return None
+    height, width = picture.image.shape[:2]
+    image, legend = _PER_PIXEL[kind](aovs)
+    return Overlay(image, (width, height), legend)
+
+
+def color_map(table: npt.NDArray[np.float64], places: npt.ArrayLike) -> Pixels:
+    """(..., 3) colours at `places`, 0 to 1, along a table of colours at equal distances."""
+    at = np.clip(np.asarray(places, np.float64), 0.0, 1.0) * (len(table) - 1)
+    stops = np.arange(len(table))
+    channels = [np.interp(at, stops, table[:, c]) for c in range(3)]
+    return np.rint(np.stack(channels, axis=-1)).astype(np.uint8)
+
+
+def object_colors(count: int) -> Pixels:
+    """(count, 3) colours of objects by index: hues a golden turn apart, so that neighbours in the list
+    differ most and a new object changes no other's, in two lightnesses of OKLab (B. Ottosson, 2020)."""
+    index = np.arange(count)
+    hue = index * _GOLDEN_TURN + 0.5
+    lightness = np.where(index % 2 == 0, 0.74, 0.6)
+    return _srgb8(_linear_from_oklab(lightness, 0.13 * np.cos(hue), 0.13 * np.sin(hue)))
+
+
+def _queue(picture: Picture) -> Overlay:
+    grid, order = picture.grid, np.asarray(picture.queue)
+    place = np.arange(len(order))
+    image = np.zeros((grid.count, 4), np.uint8)
+    image[order, :3] = color_map(VIRIDIS, place / max(len(order) - 1, 1))
+    image[order, 3] = np.where(place < picture.queue_done, _DONE_ALPHA, _WAITING_ALPHA)
+    x, y = grid.origin(order)
+    right, bottom = np.minimum(x + grid.tile_size, grid.width), np.minimum(y + grid.tile_size, grid.height)
+    centers = np.column_stack([(x + right) / 2, (y + bottom) / 2])
+    legend = _legend(VIRIDIS, [("first", 0.0), ("last", 1.0)])
+    return _of_tiles(picture, image, legend, place + 1, centers)
+
+
+def _replaced(picture: Picture) -> Overlay:
+    image = np.where(np.asarray(picture.replaced)[:, None], np.array(_REPLACED, np.uint8), np.uint8(0))
+    return _of_tiles(picture, image, (("replaced", _REPLACED[:3]),))
+
+
+def _spp(picture: Picture) -> Overlay:
+    """On a logarithmic scale; black where there is no sample yet."""
+    spp = np.asarray(picture.tile_spp, np.float64)
+    some = spp > 0
+    high = max(float(spp.max(initial=1.0)), 1.0)
+    # Without a least range, 255 beside 256 samples would look like night and day.
+    low = max(min(float(spp[some].min(initial=high)), high / _LEAST_SPP_RANGE), 1.0)
+    image = np.full((len(spp), 4), 255, np.uint8)
+    image[:, :3] = color_map(HEAT, _log_place(np.maximum(spp, low), low, high))
+    image[~some, :3] = 0
+    values = np.unique(np.rint(np.geomspace(low, high, 5)).astype(np.int64))
+    legend = _legend(HEAT, [(f"{v:,}", float(_log_place(v, low, high))) for v in values])
+    return _of_tiles(picture, image, legend)
+
+
+def _of_tiles(
+    picture: Picture,
+    image: Pixels,
+    legend: tuple[tuple[str, Color], ...],
+    numbers: npt.NDArray[np.int64] | None = None,
+    numbers_at: npt.NDArray[np.float64] | None = None,
+) -> Overlay:
+    grid = picture.grid
+    extent = (grid.columns * grid.tile_size, grid.rows * grid.tile_size)
+    return Overlay(image.reshape(grid.rows, grid.columns, 4), extent, legend, numbers, numbers_at)
+
+
+def _object_ids(aovs: Aovs) -> tuple[Pixels, tuple[tuple[str, Color], ...]]:
+    ids = aovs.object_id
+    colors = np.zeros((int(ids.max(initial=-1)) + 2, 4), np.uint8)
+    colors[1:, :3] = object_colors(len(colors) - 1)
+    colors[1:, 3] = 255
+    return colors[ids + 1], ()
+
+
+def _normals(aovs: Aovs) -> tuple[Pixels, tuple[tuple[str, Color], ...]]:
+    rgb = np.rint(aovs.normal * 127.5 + 127.5).astype(np.uint8)
+    axes = (("+x", (255, 128, 128)), ("+y", (128, 255, 128)), ("+z", (128, 128, 255)))
+    return _of_hits(aovs, rgb), axes
+
+
+def _albedo(aovs: Aovs) -> tuple[Pixels, tuple[tuple[str, Color], ...]]:
+    return _of_hits(aovs, _srgb8(aovs.albedo)), ()
+
+
+def _depth(aovs: Aovs) -> tuple[Pixels, tuple[tuple[str, Color], ...]]:
+    """On a logarithmic scale, near is bright. The farthest hundredth (a floor's horizon) shares a colour."""
+    hit = np.isfinite(aovs.depth)
+    if not hit.any():
+        return _of_hits(aovs, np.zeros((*aovs.depth.shape, 3), np.uint8)), ()
+    near, far = np.maximum(np.percentile(aovs.depth[hit], _DEPTH_PERCENTILES), 1e-6)
+    far = max(far, near * 1.01)
+    depth = np.clip(np.where(hit, aovs.depth, far), near, far)
+    shades = color_map(VIRIDIS, np.linspace(1.0, 0.0, 256))
+    rgb = shades[np.rint(_log_place(depth, near, far) * 255.0).astype(np.uint8)]
+    steps = [(f"{d:.3g} m", 1.0 - float(_log_place(d, near, far))) for d in np.geomspace(near, far, 5)]
+    return _of_hits(aovs, rgb), _legend(VIRIDIS, steps)
+
+
+_PER_PIXEL = {"object_ids": _object_ids, "normals": _normals, "albedo": _albedo, "depth": _depth}
+
+
+def _of_hits(aovs: Aovs, rgb: Pixels) -> Pixels:
+    alpha = np.where(aovs.object_id >= 0, np.uint8(255), np.uint8(0))
+    return np.concatenate([rgb, alpha[..., None]], axis=-1)
+
+
+def _log_place(values: npt.ArrayLike, low: float, high: float) -> npt.NDArray[np.float64]:
+    span = math.log(high / low)
+    place: npt.NDArray[np.float64] = (
+        np.log(np.asarray(values, np.float64) / low) / span
+        if span > 0
+        else (np.ones_like(values, np.float64))
+    )
+    return place
+
+
+def _legend(
+    table: npt.NDArray[np.float64], entries: list[tuple[str, float]]
+) -> tuple[tuple[str, Color], ...]:
+    colors = color_map(table, [place for _, place in entries])
+    return tuple(
+        (text, (int(r), int(g), int(b))) for (text, _), (r, g, b) in zip(entries, colors, strict=True)
+    )
+
+
+def _linear_from_oklab(
+    lightness: npt.NDArray[np.float64], a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float64]:
+    long = (lightness + 0.3963377774 * a + 0.2158037573 * b) ** 3
+    medium = (lightness - 0.1055613458 * a - 0.0638541728 * b) ** 3
+    short = (lightness - 0.0894841775 * a - 1.2914855480 * b) ** 3
+    return np.stack(
+        [
+            4.0767416621 * long - 3.3077115913 * medium + 0.2309699292 * short,
+            -1.2684380046 * long + 2.6097574011 * medium - 0.3413193965 * short,
+            -0.0041960863 * long - 0.7034186147 * medium + 1.7076147010 * short,
+        ],
+        axis=-1,
+    )
+
+
+def _srgb8(linear: npt.ArrayLike) -> Pixels:
+    steps = 1 << 14
+    x = np.arange(steps) / (steps - 1)
+    encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+    table = np.rint(encoded * 255.0).astype(np.uint8)
+    place = np.clip(np.asarray(linear, np.float32), 0.0, 1.0) * np.float32(steps - 1)
+    result: Pixels = table[np.rint(place).astype(np.int16)]
+    return result

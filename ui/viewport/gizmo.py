@@ -1,0 +1,144 @@
+"""The gizmo (ImGuizmo): handles in the picture that move, rotate and scale what is selected.
+
+During a drag the handles work on a matrix of their own, and every frame applies its whole way since the
+start to the objects as they were at the start: rounding does not add up, and several objects keep their
+places relative to one another.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from imgui_bundle import imgui, imguizmo
+
+from incpt.core import transform
+from incpt.scene import edits
+from incpt.scene.camera import Camera
+from incpt.scene.model import Scene
+from incpt.ui.preferences import SnapSettings
+from incpt.ui.widgets import places
+
+Matrix = npt.NDArray[np.float64]
+Rect = tuple[float, float, float, float]
+
+_gizmo = imguizmo.im_guizmo
+_OPERATIONS = {
+    "move": _gizmo.OPERATION.translate,
+    "rotate": _gizmo.OPERATION.rotate,
+    "scale": _gizmo.OPERATION.scale,
+}
+_NEAR, _FAR = 0.01, 10000.0
+
+
+@dataclass
+class _Drag:
+    scene: Scene
+    start: Matrix
+    matrix: Matrix
+
+
+class Gizmo:
+    """Handles for the selection. `is_using` tells whether one is being dragged, `is_over` whether the mouse
+    is on one."""
+
+    def __init__(self) -> None:
+        self._drag: _Drag | None = None
+        self._is_given_up = False
+        self.is_using = False
+        self.is_over = False
+
+    def draw(
+        self, scene: Scene, names: tuple[str, ...], operation: str, space: str, snap: SnapSettings, rect: Rect
+    ) -> Scene:
+        """Draw the handles over the picture in `rect` (left, top, width, height, points) and return the
+        scene after this frame."""
+        _gizmo.begin_frame()
+        visible = tuple(name for name in names if scene.object(name).visible)
+        if not visible:
+            self.is_using = self.is_over = False
+            self._drag = None
+            return scene
+        matrix = self._drag.matrix if self._drag is not None else pivot(scene, visible, space)
+        _gizmo.set_drawlist(imgui.get_background_draw_list())
+        _gizmo.set_rect(*rect)
+        _gizmo.set_gizmo_size_clip_space(0.14)
+        view, projection = view_matrix(scene.camera), projection_matrix(scene.camera, rect[2] / rect[3])
+        flat = _flat(matrix)
+        step = {"move": snap.move_m, "rotate": snap.rotate_deg, "scale": snap.scale}[operation]
+        _gizmo.manipulate(
+            _flat(view), _flat(projection), _OPERATIONS[operation],
+            _gizmo.MODE.local if space == "local" or operation == "scale" else _gizmo.MODE.world,
+            flat, None, _gizmo.Matrix3([step] * 3) if snap.enabled else None,
+        )  # fmt: skip
+        _note_place(view, projection, matrix, rect)
+        return self._follow(scene, visible, matrix, np.array(flat.values, np.float64).reshape(4, 4).T)
+
+    def give_up(self) -> None:
+        """Do nothing more until the handle is let go."""
+        self._drag = None
+        self._is_given_up = self.is_using
+
+    def _follow(self, scene: Scene, names: tuple[str, ...], old: Matrix, new: Matrix) -> Scene:
+        self.is_using, self.is_over = _gizmo.is_using(), _gizmo.is_over()
+        if not self.is_using:
+            self._is_given_up = False
+        if not self.is_using or self._is_given_up:
+            self._drag = None
+            return scene
+        if self._drag is None:
+            self._drag = _Drag(scene, old, old)
+        if np.array_equal(new, self._drag.matrix) or not np.isfinite(new).all():
+            return scene
+        self._drag.matrix = new
+        delta = new @ np.linalg.inv(self._drag.start)
+        return edits.transform_objects(self._drag.scene, names, delta)
+
+
+def pivot(scene: Scene, names: tuple[str, ...], space: str) -> Matrix:
+    """(4, 4) where the handles stand: the object's own matrix; for several objects the mean of their
+    positions with the axes of the active one (local) or of the world."""
+    active = scene.object(names[-1])
+    matrix = np.eye(4)
+    if len(names) == 1:
+        matrix[:3] = active.world_from_object
+    else:
+        if space == "local":
+            matrix[:3, :3] = transform.rotation_matrix(active.rotation)
+        matrix[:3, 3] = np.mean([scene.object(name).position for name in names], axis=0)
+    return matrix
+
+
+def view_matrix(camera: Camera) -> Matrix:
+    """(4, 4) camera from world; the camera looks along -z, as OpenGL has it."""
+    right, up, forward = transform.camera_frame(camera.position, camera.target, camera.up, camera.fov_y, 1.0)
+    rows = np.array([right / np.linalg.norm(right), up / np.linalg.norm(up), -forward])
+    matrix = np.eye(4)
+    matrix[:3, :3] = rows
+    matrix[:3, 3] = -rows @ camera.position
+    return matrix
+
+
+def projection_matrix(camera: Camera, aspect: float) -> Matrix:
+    """(4, 4) clip space from camera space, as OpenGL has it."""
+    scale = 1.0 / math.tan(math.radians(camera.fov_y) / 2.0)
+    matrix = np.zeros((4, 4))
+    matrix[0, 0], matrix[1, 1] = scale / aspect, scale
+    matrix[2, 2], matrix[2, 3] = (_FAR + _NEAR) / (_NEAR - _FAR), 2.0 * _FAR * _NEAR / (_NEAR - _FAR)
+    matrix[3, 2] = -1.0
+    return matrix
+
+
+def _flat(matrix: Matrix) -> imguizmo.im_guizmo.Matrix16:
+    # Column by column, as OpenGL's matrices lie in memory.
+    return _gizmo.Matrix16(matrix.T.ravel().tolist())
+
+
+def _note_place(view: Matrix, projection: Matrix, matrix: Matrix, rect: Rect) -> None:
+    clip = projection @ view @ matrix[:, 3]
+    if clip[3] > 0:
+        x = rect[0] + (clip[0] / clip[3] + 1) / 2 * rect[2]
+        y = rect[1] + (1 - clip[1] / clip[3]) / 2 * rect[3]
+        places.note_rect("gizmo", (x, y, x, y))

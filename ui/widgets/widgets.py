@@ -1,0 +1,266 @@
+"""Widgets that take a value and return the value after this frame. They know no scene and no renderer.
+
+Each stands in a row of its own: label on the left, field on the right. A value that its owner refuses
+(InputError) is refused softly: see `accepted`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TypeVar
+
+import numpy as np
+from imgui_bundle import imgui
+
+from incpt.core.errors import InputError, one_line
+from incpt.core.transform import Vector
+from incpt.ui.widgets import places, theme
+
+T = TypeVar("T")
+
+_AXES = ("X", "Y", "Z")
+_AXIS_COLORS = ((0.90, 0.35, 0.38, 1.0), (0.52, 0.78, 0.30, 1.0), (0.35, 0.58, 0.95, 1.0))
+_LABEL_SHARE = 0.38
+_edited = [0]
+
+
+class Refusals:
+    """What the fields of a panel refused in this frame, in the words of the error."""
+
+    def __init__(self) -> None:
+        self.messages: list[str] = []
+
+    def accepted(self, old: T, make: Callable[[], T]) -> T:
+        """`make()`, or the old value where that raises InputError: the field keeps the last good one."""
+        try:
+            return make()
+        except InputError as error:
+            self.messages.append(one_line(str(error)))
+            return old
+
+
+@contextmanager
+def row(label: str, tip: str = "") -> Iterator[str]:
+    """A row with a label; yields the hidden label for the field, which gets the width that is left."""
+    width = imgui.get_content_region_avail().x
+    start = imgui.get_cursor_pos_x()
+    imgui.align_text_to_frame_padding()
+    _clipped_text(label, width * _LABEL_SHARE)
+    if tip:
+        imgui.set_item_tooltip(tip)
+    imgui.same_line(start + width * _LABEL_SHARE)
+    imgui.set_next_item_width(width * (1 - _LABEL_SHARE))
+    yield f"##{label}"
+
+
+def number(
+    label: str,
+    value: float,
+    *,
+    low: float = 0.0,
+    high: float = 0.0,
+    speed: float = 0.01,
+    unit: str = "",
+    decimals: int = 3,
+    tip: str = "",
+    logarithmic: bool = False,
+) -> float:
+    """A number to drag, or to type after a double click. `low` and `high` bound the drag only."""
+    flags = imgui.SliderFlags_.logarithmic if logarithmic else imgui.SliderFlags_.none
+    with row(label, tip) as field:
+        form = f"%.{decimals}f{_escaped(unit)}"
+        changed, result = imgui.drag_float(field, value, speed, low, high, form, flags)
+        _note(label, changed)
+    return result if changed else value
+
+
+def whole_number(label: str, value: int, *, low: int, high: int, speed: float = 0.1, tip: str = "") -> int:
+    """A whole number to drag or to type, held between `low` and `high`."""
+    with row(label, tip) as field:
+        # A file may hold numbers that the widget does not offer, or that imgui's 32 bits do not.
+        shown = min(max(value, -(1 << 31)), (1 << 31) - 1)
+        flags = imgui.SliderFlags_.always_clamp
+        changed, result = imgui.drag_int(field, shown, speed, low, high, "%d", flags)
+        _note(label, changed)
+    return result if changed else value
+
+
+def vector(
+    label: str,
+    value: Vector,
+    *,
+    speed: float = 0.01,
+    low: float = 0.0,
+    high: float = 0.0,
+    unit: str = "",
+    decimals: int = 3,
+    tip: str = "",
+    names: Sequence[str] = _AXES,
+) -> Vector:
+    """Three numbers below one another, each with the colour of its axis. Named "label X" and so on."""
+    result = list(value)
+    imgui.push_id(label)
+    for axis, name in enumerate(names):
+        with row(label if axis == 0 else "", tip):
+            _axis_mark(axis, name)
+            form = f"%.{decimals}f{_escaped(unit)}"
+            changed, typed = imgui.drag_float(f"##{axis}", value[axis], speed, low, high, form)
+            _note(f"{label} {name}", changed)
+        if changed:
+            result[axis] = typed
+    imgui.pop_id()
+    return result[0], result[1], result[2]
+
+
+def color(label: str, value: Vector, *, is_radiance: bool = False, tip: str = "") -> Vector:
+    """A linear RGB colour; where `is_radiance`, components may be over 1."""
+    flags = imgui.ColorEditFlags_.float
+    if is_radiance:
+        flags |= imgui.ColorEditFlags_.hdr
+    with row(label, tip) as field:
+        shown = list(map(_rounded, value))
+        changed, result = imgui.color_edit3(field, shown, flags)
+        _note(label, changed)
+    # What was not touched stays to the bit, which imgui's 32 bits would round.
+    r, g, b = (old if new == seen else new for old, seen, new in zip(value, shown, result, strict=True))
+    return r, g, b
+
+
+def radiance(label: str, value: Vector, tip: str = "") -> Vector:
+    """A radiance as a colour whose greatest component is 1 and a strength. Named "label colour" and
+    "label strength"."""
+    strength = max(value)
+    tint = (
+        (value[0] / strength, value[1] / strength, value[2] / strength) if strength > 0 else (1.0, 1.0, 1.0)
+    )
+    new_tint = color(f"{label} colour", tint, tip=tip)
+    new_strength = number(f"{label} strength", strength, high=1e6, speed=0.02, tip=tip)
+    if new_tint == tint and new_strength == strength:
+        return value
+    r, g, b = (component * new_strength for component in new_tint)
+    return r, g, b
+
+
+def checkbox(label: str, value: bool, tip: str = "") -> bool:
+    """On or off."""
+    with row(label, tip) as field:
+        changed, result = imgui.checkbox(field, value)
+        _note(label, changed)
+    return result
+
+
+def choice(label: str, value: str, options: Sequence[tuple[str, str]], tip: str = "") -> str:
+    """One of `options`, given as (value, text)."""
+    texts = dict(options)
+    with row(label, tip) as field:
+        shown = texts.get(value, value)
+        is_open = imgui.begin_combo(field, shown)
+        places.note(label)
+        arrow = imgui.get_frame_height() + imgui.get_style().frame_padding.x
+        if imgui.calc_text_size(shown).x > imgui.get_item_rect_size().x - arrow:
+            imgui.set_item_tooltip(shown)
+        if is_open:
+            for option, text in options:
+                chosen = imgui.selectable(text, option == value)[0]
+                _note(f"{label}: {text}", chosen)
+                if chosen:
+                    value = option
+            imgui.end_combo()
+    return value
+
+
+def text(label: str, value: str, tip: str = "") -> str | None:
+    """A text; the new one when Enter or a click elsewhere ends the typing, None before that."""
+    with row(label, tip) as field:
+        _, typed = imgui.input_text(field, value, imgui.InputTextFlags_.auto_select_all)
+        places.note(label)
+    return typed if imgui.is_item_deactivated_after_edit() and typed != value else None
+
+
+def button(label: str, tip: str = "", *, enabled: bool = True, width: float = 0.0) -> bool:
+    """Whether it was pressed."""
+    imgui.begin_disabled(not enabled)
+    pressed = imgui.button(label, imgui.ImVec2(width, 0.0))
+    imgui.end_disabled()
+    places.note(label)
+    if tip and imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
+        imgui.set_tooltip(tip)
+    return pressed
+
+
+def same_line() -> None:
+    """The next button stands beside the last one."""
+    imgui.same_line(0.0, imgui.get_style().item_inner_spacing.x)
+
+
+def value_row(label: str, value: str, tip: str = "") -> None:
+    """A value that is shown only."""
+    with row(label, tip):
+        imgui.align_text_to_frame_padding()
+        _clipped_text(value, imgui.get_content_region_avail().x)
+        places.note(label)
+
+
+@contextmanager
+def section(label: str, is_open: bool = True) -> Iterator[bool]:
+    """A part of a panel with a header that folds it; yields whether it is unfolded."""
+    flags = imgui.TreeNodeFlags_.default_open if is_open else imgui.TreeNodeFlags_.none
+    shown = imgui.collapsing_header(label, flags)
+    places.note(label)
+    imgui.push_id(label)
+    yield shown
+    imgui.pop_id()
+
+
+def note(message: str, color: theme.Rgba = theme.QUIET) -> None:
+    """A remark below a field, wrapped."""
+    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*color))
+    imgui.text_wrapped(message)
+    imgui.pop_style_color()
+
+
+def show_refusals(refusals: Refusals) -> None:
+    """What was refused in this frame."""
+    for message in refusals.messages:
+        note(message, theme.WARNING)
+
+
+def edited() -> int:
+    """imgui's number of the widget whose value changed last: what the edits of one drag have in common."""
+    return _edited[0]
+
+
+def _note(name: str, has_changed: bool) -> None:
+    places.note(name)
+    if has_changed:
+        _edited[0] = imgui.get_item_id()
+
+
+def _axis_mark(axis: int, name: str) -> None:
+    # Left of the field that follows, where no widget stands.
+    at, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height()
+    width = max(2.0, height * 0.12)
+    draw = imgui.get_window_draw_list()
+    tint = imgui.get_color_u32(imgui.ImVec4(*_AXIS_COLORS[axis]))
+    draw.add_rect_filled((at.x - width, at.y), (at.x, at.y + height), tint)
+    size = imgui.calc_text_size(name)
+    place = (at.x - 3.0 * width - size.x, at.y + (height - size.y) / 2)
+    draw.add_text(place, imgui.get_color_u32(imgui.ImVec4(*theme.QUIET)), name)
+
+
+def _clipped_text(label: str, width: float) -> None:
+    shown = label
+    while len(shown) > 1 and imgui.calc_text_size(shown).x > width - imgui.get_style().item_inner_spacing.x:
+        shown = shown[:-2].rstrip() + "…"
+    imgui.text_unformatted(shown)
+    if shown != label:
+        imgui.set_item_tooltip(label)
+
+
+def _rounded(value: float) -> float:
+    return float(np.float32(value))
+
+
+def _escaped(unit: str) -> str:
+    return unit.replace("%", "%%")
