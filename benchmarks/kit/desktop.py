@@ -29,6 +29,7 @@ INSTALL = "apt install xvfb xdotool libgl1 libgl1-mesa-dri"
 _START_SECONDS = 20.0
 _CLIENT_MESSAGE = 33
 """Type of the event, from X.h."""
+_MODIFIERS = {"ctrl": "Control_L", "shift": "Shift_L", "alt": "Alt_L"}
 _TYPED_AT_ONCE = 12
 _KEY_SECONDS = 0.02
 """Between key down and up: a tap without it falls between two frames."""
@@ -163,21 +164,23 @@ class Hand:
 
     def key(self, keys: str) -> None:
         """A tap on a key such as "ctrl+z"; keys are named as X names them."""
-        _xdotool("keydown", keys)
+        codes = _key_codes(keys)
+        _xdotool("keydown", codes)
         time.sleep(_KEY_SECONDS)
         self.pump(frames=2)
-        _xdotool("keyup", keys)
+        _xdotool("keyup", codes)
         self.pump(frames=3)
 
     @contextmanager
     def holding(self, key: str) -> Iterator[None]:
         """While a key is held down."""
-        _xdotool("keydown", key)
+        codes = _key_codes(key)
+        _xdotool("keydown", codes)
         self.pump(frames=2)
         try:
             yield
         finally:
-            _xdotool("keyup", key)
+            _xdotool("keyup", codes)
             self.pump(frames=2)
 
     def type(self, text: str) -> None:
@@ -237,18 +240,42 @@ class _ClientMessage(ctypes.Structure):
 def ask_to_close(window: int) -> None:
     """Send the window with that X id what a window manager sends when its close button is pressed. xdotool
     cannot in the versions that distributions still ship."""
+    with _connection() as (x11, display):
+        protocols, delete = (
+            x11.XInternAtom(display, name, False) for name in (b"WM_PROTOCOLS", b"WM_DELETE_WINDOW")
+        )
+        message = _ClientMessage(type=_CLIENT_MESSAGE, window=window, message_type=protocols, format=32)
+        message.values[0] = delete
+        x11.XSendEvent(display, ctypes.c_ulong(window), False, ctypes.c_long(0), ctypes.byref(message))
+        x11.XSync(display, False)
+
+
+@contextmanager
+def _connection() -> Iterator[tuple[ctypes.CDLL, ctypes.c_void_p]]:
+    """libX11 and a connection to the display."""
     x11 = ctypes.CDLL("libX11.so.6")
     x11.XOpenDisplay.restype = ctypes.c_void_p
     x11.XInternAtom.restype = ctypes.c_ulong
+    x11.XStringToKeysym.restype = ctypes.c_ulong
+    x11.XKeysymToKeycode.restype = ctypes.c_ubyte
     display = ctypes.c_void_p(x11.XOpenDisplay(None))
-    protocols, delete = (
-        x11.XInternAtom(display, name, False) for name in (b"WM_PROTOCOLS", b"WM_DELETE_WINDOW")
-    )
-    message = _ClientMessage(type=_CLIENT_MESSAGE, window=window, message_type=protocols, format=32)
-    message.values[0] = delete
-    x11.XSendEvent(display, ctypes.c_ulong(window), False, ctypes.c_long(0), ctypes.byref(message))
-    x11.XSync(display, False)
-    x11.XCloseDisplay(display)
+    try:
+        yield x11, display
+    finally:
+        x11.XCloseDisplay(display)
+
+
+def _key_codes(keys: str) -> str:
+    """Keys such as "ctrl+z" by their codes on the keyboard. By name, xdotool holds Alt with a function key
+    where the keyboard's description says that Alt leaves it what it is, as that of xkb-data 2.48 does."""
+    names = [_MODIFIERS.get(name, name) for name in keys.split("+")]
+    with _connection() as (x11, display):
+        symbols = [ctypes.c_ulong(x11.XStringToKeysym(name.encode())) for name in names]
+        codes = [x11.XKeysymToKeycode(display, symbol) for symbol in symbols]
+    if 0 in codes:
+        raise LookupError(f"no key {names[codes.index(0)]!r} on this keyboard")
+    # Of three digits: one alone is the name of a key.
+    return "+".join(f"{code:03d}" for code in codes)
 
 
 def _has_input() -> bool:
