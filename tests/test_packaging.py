@@ -77,6 +77,7 @@ def test_kernels_and_scenes_are_found_as_resources() -> None:
     assert any(item.name.endswith(".toml") for item in resources.files("incpt.scenes").iterdir())
 
 
+@pytest.mark.slow
 def test_importing_incpt_opens_no_window_library() -> None:
     code = "import sys, incpt, incpt.cli.main; print(*sys.modules)"
     modules = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout

@@ -272,6 +272,7 @@ def test_depth_is_bounded(device: Device) -> None:
     check_tree(bvh.build_mesh(device, mesh), face_boxes(mesh), is_mesh=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "mesh",
     [
@@ -347,6 +348,7 @@ def test_refit_refuses_another_number_of_faces(device: Device) -> None:
 # --- rays against brute force -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "size"), [(1, 1.0), (7, 1.0), (300, 0.3), (3000, 0.02)])
 def test_triangle_soups(device: Device, count: int, size: float) -> None:
     rng = np.random.default_rng(count)
@@ -354,6 +356,7 @@ def test_triangle_soups(device: Device, count: int, size: float) -> None:
     assert hits.hit.any() and not hits.hit.all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["cube", "plane", "cylinder"])
 @pytest.mark.parametrize(
     "placement",
@@ -393,6 +396,7 @@ def test_shading_normals_of_a_sphere_point_from_its_centre(device: Device) -> No
     np.testing.assert_allclose(hits.floats(HitPlane.SHADING_X, 3), outward, atol=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 9, 1000])
 def test_many_objects(device: Device, count: int) -> None:
     rng = np.random.default_rng(count)

@@ -159,6 +159,7 @@ def test_what_is_no_parallelepiped(mesh: Mesh) -> None:
     assert len(own.solids) == 0 and own.loose == len(own.faces)
 
 
+@pytest.mark.slow
 @given(st.integers(1, 6), st.integers(1, 6), st.sampled_from([0.0, 0.3, -1.7]), st.integers(0, 99))
 def test_nets_pair_up_whatever_corner_faces_start_with(
     columns: int, rows: int, skew: float, seed: int
@@ -376,6 +377,7 @@ def placed(meshes: Sequence[Mesh], seed: int) -> Scene:
     ])  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_the_sweep_meets_what_trees_meet(device: Device, seed: int) -> None:
     """Object, face, position and normals, whichever half of a parallelogram and wherever faces start."""
@@ -438,6 +440,7 @@ def test_rays_along_the_sides_of_a_parallelepiped(device: Device) -> None:
     np.testing.assert_allclose(*distances, rtol=1e-5, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "placement",
     [

@@ -195,6 +195,7 @@ def test_sweep_tells_what_nor_and_tile_size_are_worth() -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_sweep_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene, edits = tmp_path / "scene.toml", tmp_path / "edits.toml"
     plain = mixed_scene().without_object("glass ball")
@@ -254,6 +255,7 @@ def test_bad_options(
 # ------------------------------------------------------------------------------------------- table 5.1
 
 
+@pytest.mark.slow
 def test_table51_beside_the_thesis(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["bench", "table51", "-o", str(tmp_path), "--size", "48x27", "--base-spp", "64"]
     assert main.main([*command, "--reference-spp", "128"]) == 0

@@ -105,6 +105,7 @@ def _among_balls() -> Scene:
     return replace(balls, materials={**balls.materials, **lamp_material}, objects=objects)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*SCENES, "balls"])
 def test_rays_in_blocks_meet_what_rays_of_a_wavefront_meet(name: str, device: Device) -> None:
     """Swept, several at a time through trees, and one at a time: hits and shadow rays are the same."""
@@ -213,6 +214,7 @@ def parsed(text: str) -> _Page:
     return page
 
 
+@pytest.mark.slow
 def test_report_of_partial_results(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no results; measure first"):
         report.page(tmp_path)
@@ -236,6 +238,7 @@ def test_report_of_partial_results(tmp_path: Path) -> None:
     assert "0.10000 (0.11519)" in text
 
 
+@pytest.mark.slow
 def test_report_of_every_experiment(tmp_path: Path) -> None:
     """A page with all kinds of plots, from the fewest results that have one."""
     environment = {"id": "e", "machine": "m", "cores": 2}

@@ -182,6 +182,7 @@ def test_bounces_of_renderers_that_count_all_alike() -> None:
     assert PEERS[0] == "incpt"
 
 
+@pytest.mark.slow
 def test_incpt_as_a_worker() -> None:
     bench = scenes.SCENES["cornell"]
     worker = Worker("incpt", 1)

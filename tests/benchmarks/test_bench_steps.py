@@ -54,6 +54,7 @@ def test_kernels_of_a_step_fit_into_it() -> None:
     assert device.take_busy_seconds() == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*SCENES, "terrain-100k"])
 def test_close_up_shows_the_object_alone(name: str) -> None:
     bench = steps.KNOWN[name]
@@ -164,6 +165,7 @@ def test_of_large_scenes_repetition_alone_is_measured() -> None:
     assert measures == every | {("terrain-100k", steps.REPETITION)}
 
 
+@pytest.mark.slow
 def test_steps_of_a_small_scene(tmp_path: Path) -> None:
     plan = steps.Plan(["cornell"], steps=2, close_size=(32, 18), samples=8, spiral_steps=1, repetitions=1)
     device = steps.ProfiledDevice()

@@ -69,6 +69,7 @@ def test_load_is_what_others_had(monkeypatch: pytest.MonkeyPatch) -> None:
     assert meter.read().other_cores == 0
 
 
+@pytest.mark.slow
 def test_work_of_workers_is_our_own_and_that_of_strangers_is_not() -> None:
     spin = "import time; end = time.process_time() + 0.3\nwhile time.process_time() < end: pass"
     meter = LoadMeter()

@@ -104,6 +104,7 @@ def test_specular_scales_reflection_but_not_total_reflection() -> None:
     assert (inside[2] > 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("eta", ETAS)
 @pytest.mark.parametrize("alpha", [0.1, 0.35, 0.9])
 def test_samples_of_rough_boundary_follow_the_density(eta: float, alpha: float) -> None:
@@ -174,6 +175,7 @@ def single_scattering_share(eta: float, alpha: float, cosine: float) -> float:
     return float((np.where(facing, sent * o_h / (cosine * cos_h), 0) * 2 * (1 - s)).mean())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("eta", ETAS)
 @pytest.mark.parametrize("alpha", [0.04, 0.15, 0.5, 1.0])
 def test_furnace_rough_boundary_loses_what_scatters_twice(eta: float, alpha: float) -> None:

@@ -76,6 +76,7 @@ def wo_at(angle_deg: float) -> npt.NDArray[np.float64]:
     return direction(np.radians(angle_deg), 0.4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MATERIALS)
 def test_samples_follow_the_density(name: str) -> None:
     for angle in ANGLES_DEG:
@@ -153,6 +154,7 @@ def integral(material: Material, angle_deg: float) -> Array:
     return np.asarray(np.einsum("cij,i->c", value, np.sin(theta) * dtheta * 2 * np.pi / m))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("roughness", [0.2, 0.4, 0.6, 0.8, 1.0])
 @pytest.mark.parametrize("ior", [1.2, 1.5, 2.0])
 def test_furnace_white_plastic(roughness: float, ior: float) -> None:

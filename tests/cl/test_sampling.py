@@ -69,6 +69,7 @@ def visible_normal_pdf(wo: Array, alpha: float, h: Array) -> Array:
     return np.asarray(d * np.maximum(wo @ h, 0) / ((1 + lambda_) * wo[2]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("alpha", [0.06, 0.25, 0.7, 1.0])
 @pytest.mark.parametrize("theta_deg", [0.0, 30.0, 65.0, 88.0])
 def test_visible_normals(alpha: float, theta_deg: float) -> None:

@@ -65,6 +65,7 @@ def only_line(text: str) -> str:
 # ------------------------------------------------------------------------------------------- render
 
 
+@pytest.mark.slow
 def test_render_puts_aovs_into_an_exr(
     scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -313,6 +314,7 @@ def test_version_and_help(option: str, said: str, capsys: pytest.CaptureFixture[
     assert said in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_it_runs_as_a_module() -> None:
     done = subprocess.run(
         [sys.executable, "-m", "incpt", "check", "nothing.toml"], capture_output=True, text=True, check=False

@@ -174,6 +174,7 @@ def small(make: Callable[[], Scene]) -> Scene:
     return replace(scene, settings=replace(scene.settings, size=(53, 37), base_nor=8, roulette_depth=1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [mixed_scene, cornell, glass, plates], ids=lambda make: make.__name__)
 def test_blocks_and_wavefront_agree(make: Callable[[], Scene], device: Device) -> None:
     """The kernel that traces blocks of paths on CPUs, and the wavefront of all other devices."""
@@ -264,6 +265,7 @@ def remarks_on_vectorisation(device: Device, text: str) -> list[str]:
     return [line for line in log.splitlines() if "not vectorized" in line]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("features", VARIANTS, ids=lambda features: " ".join(features) or "plain")
 def test_pocl_runs_shading_in_simd_lanes(device: Device, features: tuple[str, ...]) -> None:
     """Every loop over a block that asks for SIMD lanes gets them; the compiler warns where it cannot."""
@@ -282,6 +284,7 @@ def test_loops_that_pocl_cannot_vectorise_are_noticed(device: Device) -> None:
     assert remarks_on_vectorisation(device, called) != []
 
 
+@pytest.mark.slow
 def test_kernels_build_without_warnings(device: Device) -> None:
     variants = [*VARIANTS, ("EMISSION_ONLY",)]
     for file, path in program.files().items():

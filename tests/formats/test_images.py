@@ -129,6 +129,7 @@ def test_files_that_are_no_image(tmp_path: Path) -> None:
             images.load_image(path)
 
 
+@pytest.mark.slow
 def test_a_damaged_image_prints_nothing(tmp_path: Path) -> None:
     path = tmp_path / "a.exr"
     images.write_exr(path, {"RGB": np.random.default_rng(0).random((200, 200, 3))})
@@ -233,6 +234,7 @@ def test_a_folder_that_is_not_there(tmp_path: Path, name: str) -> None:
     assert os.listdir(tmp_path) == [name]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on the size of files")
 @pytest.mark.parametrize("name", ["a.exr", "a.png"])
 def test_a_full_disk_keeps_the_old_file(tmp_path: Path, name: str) -> None:

@@ -414,6 +414,7 @@ def scenes(draw: st.DrawFn) -> Scene:
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(scene=scenes())
 def test_any_scene_survives_a_file(tmp_path: Path, scene: Scene) -> None:
@@ -429,6 +430,7 @@ FULL = VALID + 'rotation = [0, 30, 0]\n[render]\nsize = [64, 32]\nstrategy = "sp
 WORDS = [*b"0123456789.,[]{}\"'=\n#-+_enaif\\\0 \xff\xc3", *b"truefalsnd"]
 
 
+@pytest.mark.slow
 @settings(max_examples=250, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     edits=st.lists(

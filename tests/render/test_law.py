@@ -23,6 +23,8 @@ from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
 
+pytestmark = pytest.mark.slow
+
 Edit = Callable[[Scene], Scene]
 NOR = 4
 

@@ -11,6 +11,8 @@ from support import reference_scenes
 from support.reference_scenes import REFERENCES, SIZE
 from support.renders import blocks, repeat
 
+pytestmark = pytest.mark.slow
+
 Array = npt.NDArray[np.float64]
 _FOLDER = Path(reference_scenes.__file__).parent / "references"
 RENDERS = 8

@@ -154,6 +154,7 @@ def _plane(name: str, material: str = "lamp", **placed: Vector) -> Object:
     return Object(name, shape("plane"), material, **placed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "placed",
     [
@@ -247,6 +248,7 @@ def test_lights_without_area_do_no_harm() -> None:
 # Counting bounces
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("max_bounces", [0, 1, 2, 5])
 def test_bounces_are_counted_after_the_first_hit(max_bounces: int) -> None:
     # In a closed box whose walls emit 1 and reflect half, every order of scattering adds half the one before.
@@ -364,6 +366,7 @@ def _sky() -> Environment:
     return Environment((1, 1, 1), Image(pixels), rotation_y=40)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["triangles", "environment", "both", "rough glass", "rough glass, direct"])
 @pytest.mark.parametrize("technique", ["light", "bsdf"])
 def test_each_technique_alone_gives_the_same(
@@ -531,6 +534,7 @@ def test_nothing_arrives_through_an_endless_medium(roughness: float, image: Imag
 _GLASS, _LIQUID = (2.0, (0.2, 0.4, 0.0)), (1.333, (0.0, 1.0, 2.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("priorities", "layers"),
     [
@@ -630,6 +634,7 @@ def test_opaque_body_in_a_medium_is_lit_through_it() -> None:
 # Light leaks
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", [(1, 1, 0.3), (1, 1, 1), (-1, 0.2, 1), (0.1, -1, -1)], ids=str)
 @pytest.mark.parametrize(
     ("size", "rotation", "position"),
@@ -650,6 +655,7 @@ def test_a_path_does_not_slip_out_where_it_hits_an_edge(
     assert (image == 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["cube", "sphere", "cylinder"])
 @pytest.mark.parametrize(
     "placed",
@@ -691,6 +697,7 @@ def test_no_light_leaks_between_the_walls_of_a_room() -> None:
 # Odd numbers
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_no_sample_is_undefined_or_negative(seed: int) -> None:
     # Extremes of every parameter at once; `render` asserts that all samples are finite.

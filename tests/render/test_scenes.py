@@ -42,6 +42,7 @@ def test_every_scene_file_is_tested() -> None:
     assert found == set(NAMES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_scene_gives_a_picture(name: str, scenes: dict[str, Scene], device: Device) -> None:
     """No sample is lost, and the tone-mapped picture is neither black nor blown out, and not flat."""
@@ -170,6 +171,7 @@ def test_city_is_large(scenes: dict[str, Scene]) -> None:
     assert max(Counter(id(obj.mesh) for obj in scene.objects).values()) > 100
 
 
+@pytest.mark.slow
 def test_city_is_what_its_script_makes(tmp_path: Path) -> None:
     """Compressed bytes differ between versions of zlib, so what is in them is compared."""
     make_city.main(tmp_path)

@@ -64,6 +64,7 @@ def test_picture_has_the_size_asked_for(device: Device) -> None:
     assert session.image().dtype == np.float32
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("nor", "slots"), [(1, 7), (16, None), (16, 5), (64, None), (64, 5), (64, 300)])
 def test_repetitions_equal_refinement_passes(
     device: Device, converged: np.ndarray, nor: int, slots: int | None
@@ -299,6 +300,7 @@ def test_alpha_tells_where_there_was_a_picture(device: Device) -> None:
     np.testing.assert_array_equal(session.image(alpha=True), image)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("in_blocks", [False, True])
 def test_no_kernel_is_built_after_building(
     device: Device, monkeypatch: pytest.MonkeyPatch, in_blocks: bool

@@ -97,6 +97,7 @@ def test_scenes_are_copied_and_pickled() -> None:
         assert again.with_material("grey", roughness=0).material("grey").roughness == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("make", "message"),
     [

@@ -96,6 +96,7 @@ def objects_of(device: Device, described: DeviceScene) -> npt.NDArray[np.void]:
     return read(device, described, "objects").view(layout.OBJECT)
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 6), EDITS, st.sampled_from((20, 4096)))
 def test_after_any_edits_all_is_as_from_a_fresh_start(

@@ -76,6 +76,7 @@ def test_dangerous_keys_need_more_than_a_letter_or_are_undone(navigation: str) -
         assert command(name).keys_in(navigation).startswith("Ctrl+")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("one", COMMANDS, ids=lambda one: one.name)
 @pytest.mark.parametrize(
     ("where", "selected"),

@@ -99,6 +99,7 @@ def test_a_scene_is_opened_by_clicking_on_it(user: Desk, other: Path, tmp_path: 
     assert user.scene == OTHER and user.editor.document.path == tmp_path / "sub" / "a.toml"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "typed", ["missing.toml", "bad.toml", "x.docx", "~nobody-of-that-name/a.toml", "", " "]
 )

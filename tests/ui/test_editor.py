@@ -586,6 +586,7 @@ def act_on(user: Desk, name: str, kind: str, value: Any) -> None:
         editor.propose(edits.assign_material(editor.scene, editor.selection.names, "glass"), "Assign")
 
 
+@pytest.mark.slow
 @settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(steps, min_size=4, max_size=40))
 def test_undo_and_redo_lead_through_the_same_scenes(sequence: list[tuple[str, Any]]) -> None:

@@ -234,6 +234,7 @@ AFTER: dict[str, tuple[Callable[[Desk], object], Mode]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", AFTER)
 def test_the_mode_after(table: Table, name: str) -> None:
     act, wanted = AFTER[name]
@@ -242,6 +243,7 @@ def test_the_mode_after(table: Table, name: str) -> None:
     assert kept == (wanted is not BASE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, (_, mode) in AFTER.items() if mode is INCREMENTAL])
 def test_under_restart_every_edit_starts_over(table: Table, name: str) -> None:
     table.user.editor.propose(

@@ -175,6 +175,7 @@ def test_what_a_killed_editor_leaves_is_found_and_recovered(folder: Path, tmp_pa
     assert Document.open(scene).scene == document.scene and not list(folder.iterdir())
 
 
+@pytest.mark.slow
 def test_what_is_left_may_be_discarded(folder: Path, tmp_path: Path) -> None:
     killed_editor(project(tmp_path), folder)
     (left,) = find_left_behind(folder)

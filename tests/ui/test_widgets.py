@@ -168,6 +168,7 @@ def assert_one_edit(user: Desk, before: Scene) -> None:
     assert user.scene == after and user.null.views[-1].scene == after
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("field", FIELDS, ids=str)
 def test_a_number_is_typed(user: Desk, field: Field) -> None:
     turn_to(user, field.panel, field.selected)
@@ -182,6 +183,7 @@ def test_a_number_is_typed(user: Desk, field: Field) -> None:
         assert user.scene is scene and user.undo_count == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("field", FIELDS, ids=str)
 def test_a_number_is_dragged(user: Desk, field: Field) -> None:
     turn_to(user, field.panel, field.selected)
@@ -201,6 +203,7 @@ def test_a_number_is_dragged(user: Desk, field: Field) -> None:
         assert user.scene is scene and user.undo_count == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "field", [f for f in FIELDS if is_scene(f.place) and f.across in (0.5, RED)], ids=str
 )
@@ -218,6 +221,7 @@ def test_a_drag_is_given_up_by_escape(user: Desk, field: Field) -> None:
     assert changes(before, state(user.editor)) == set() and user.undo_count == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("field", FIELDS, ids=str)
 def test_typing_is_given_up_by_escape(user: Desk, field: Field) -> None:
     turn_to(user, field.panel, field.selected)
@@ -226,6 +230,7 @@ def test_typing_is_given_up_by_escape(user: Desk, field: Field) -> None:
     assert changes(before, state(user.editor)) == set() and user.undo_count == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("typed", ["nan", "inf", "-inf", "abc", "--", "", "."])
 @pytest.mark.parametrize("field", FIELDS[:2] + FIELDS[-8:], ids=str)
 def test_what_is_no_number_changes_nothing(user: Desk, field: Field, typed: str) -> None:
@@ -237,6 +242,7 @@ def test_what_is_no_number_changes_nothing(user: Desk, field: Field, typed: str)
     assert user.undo_count == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("typed", ["1e999", "-1e999", "-1e12", "1e12"])
 @pytest.mark.parametrize(
     "field",

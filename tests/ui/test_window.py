@@ -20,6 +20,8 @@ from incpt.benchmarks.kit.desktop import Hand
 from incpt.formats import registry
 from incpt.render.modes import Mode
 
+pytestmark = pytest.mark.slow
+
 CUBE = (-0.3, 0.5, 0.6)
 
 
