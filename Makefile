@@ -1,6 +1,6 @@
 # For those whose fingers type make; everything is in ./run.
-.PHONY: demo test lint edit bench pictures screenshots
-demo test lint edit bench:
+.PHONY: demo test fast lint edit bench pictures screenshots
+demo test fast lint edit bench:
 	./run $@
 
 # The pictures of the README.

@@ -135,7 +135,7 @@ failures=0
 for suite in "$@"; do
     system=$folder/$suite.system
     trap 'remove "$suite"; exit 130' INT TERM
-    if [ -e "$system" ] && [ -z "$keep" ]; then fail "$system is there already; remove it"; fi
+    [ ! -e "$system" ] || fail "$system is there already; remove it"
     if timed debootstrap make_system; then
         for command in ${commands:-demo test}; do timed "$command" run_command "$command" || true; done
     fi
