@@ -244,4 +244,4 @@ def _in_space(boxes: Sequence[_Box]) -> list[_Box]:
     for bit in range(10):
         for axis in range(3):
             code |= (cells[:, axis] >> bit & 1) << (3 * bit + axis)
-    return [boxes[i] for i in np.argsort(code, kind="stable")]
+    return [boxes[i] for i in np.argsort(code, kind="stable").tolist()]
