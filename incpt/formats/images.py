@@ -14,7 +14,7 @@ import os
 import threading
 import weakref
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
 
@@ -162,8 +162,9 @@ def _colour_names(names: set[str]) -> Iterator[tuple[str, str, str]]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Mutes the process's stdout and stderr: OpenEXR prints each error there before it raises it."""
-    with _quiet_lock:
+    """Mutes the process's stdout and stderr: OpenEXR prints each error there before it raises it, and some
+    on Python's stdout, which would keep it and print it later."""
+    with _quiet_lock, redirect_stdout(io.StringIO()):
         saved = []
         with suppress(OSError):  # a process started without them
             saved = [(number, os.dup(number)) for number in (1, 2)]
