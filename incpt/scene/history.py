@@ -139,9 +139,3 @@ class History:
             return None
         self._cursor += 1
         return self._entries[self._cursor].selection_after
-
-    def reset(self, scene: Scene) -> None:
-        """Starts over with `scene`, as after opening a file: nothing to undo or redo."""
-        self._entries = [Entry(scene)]
-        self._cursor = 0
-        self._open = None

@@ -11,7 +11,7 @@ from incpt.scene.checks import set_number, set_vector
 
 @dataclass(frozen=True)
 class Material:
-    """Terms and ranges follow glTF 2.0; see design and `cl/material.cl` for the equations.
+    """Terms and ranges follow glTF 2.0; the equations stand in `cl/shading/material.cl`.
 
     GGX alpha is `roughness` squared. `absorption` is per metre inside a transmissive body, `priority`
     orders nested dielectrics (the higher wins, 0 is the highest of all), `emission` is radiance, from

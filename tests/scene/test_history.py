@@ -87,15 +87,6 @@ def test_the_oldest_entries_are_dropped() -> None:
     assert undone == MAX_ENTRIES and history.scene == moved(10)
 
 
-def test_reset_forgets_everything() -> None:
-    history = History(START)
-    history.propose(moved(1), "Move")
-    history.propose(moved(2), "Drag", "gizmo")
-    history.reset(moved(3))
-    assert history.scene == moved(3) and history.before is None
-    assert not history.can_undo and not history.can_redo and history.undo() is None
-
-
 @dataclass
 class Step:
     before: Scene

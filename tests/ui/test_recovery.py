@@ -52,7 +52,7 @@ def project(tmp_path: Path) -> Path:
     scene, _ = insert.add_mesh(Scene(), work / "assets" / "tri.obj")
     scene = insert.set_environment_image(scene, work / "assets" / "sky.exr")
     document = Document(scene)
-    return document.save_as(work / "scene.toml")
+    return document.save(work / "scene.toml")
 
 
 def test_nothing_is_written_before_it_is_due(folder: Path) -> None:
@@ -97,7 +97,7 @@ def test_saving_removes_the_recovery_file(folder: Path, tmp_path: Path) -> None:
     document, recovery = Document.new(), Recovery(0, folder)
     edit(document, 1)
     assert recovery.update(document, 0)
-    document.save_as(tmp_path / "a.toml")
+    document.save(tmp_path / "a.toml")
     assert not recovery.update(document, 1)
     assert recovery.path is None and not list(folder.glob("*.toml"))
     edit(document, 2)
@@ -169,7 +169,7 @@ def test_what_a_killed_editor_leaves_is_found_and_recovered(folder: Path, tmp_pa
     assert document.scene == before.with_object("tri", position=(1, 2, 3))  # the same mesh and image
     assert find_left_behind(folder) == [] and recovery.path is not None and not left.path.exists()
 
-    document.save()
+    document.save(scene)
     recovery.update(document, 1)
     recovery.remove()
     assert Document.open(scene).scene == document.scene and not list(folder.iterdir())

@@ -70,7 +70,7 @@ def save_as(editor: Editor, then: Callable[[], object] | None = None) -> None:
 
 
 def _save_to(editor: Editor, path: Path) -> None:
-    written = editor.document.save_as(path)
+    written = editor.document.save(path)
     editor.preferences = editor.preferences.with_recent(written)
     editor.messages.add(f"{written} is saved", "done")
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from incpt.core.errors import InputError, InputWarning, one_line
-from incpt.formats import mesh_files, registry, scene_save
+from incpt.formats import registry, scene_save
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
 from incpt.scene.history import History
@@ -89,14 +89,9 @@ class Document:
         """For the window's title: the name, and whether there is something to save."""
         return f"{self.name} (edited)" if self.is_dirty else self.name
 
-    def save(self) -> Path:
-        """Writes the scene to its file. Raises InputError where it has none, and as `save_as` does."""
-        if self.path is None:
-            raise InputError(f"{self.name}: has no file yet; use Save as")
-        return self.save_as(self.path)
-
-    def save_as(self, path: str | os.PathLike[str]) -> Path:
-        """Writes the scene to a scene file, atomically, and keeps to that file; returns its absolute path.
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Writes the scene to a scene file, atomically; it is the document's own from then on. Returns its
+        absolute path.
 
         ".toml" is added to a name without a suffix. A mesh or image that exists only in memory is written
         beside it. Raises InputError (another suffix, a scene that no file can hold) and OutputError (the
@@ -146,11 +141,6 @@ def absolute_path(path: str | os.PathLike[str]) -> Path:
         return Path(os.path.abspath(Path(path).expanduser()))
     except (RuntimeError, ValueError) as error:
         raise InputError(one_line(f"{path}: is no usable path ({error})")) from None
-
-
-def openable_suffixes() -> tuple[str, ...]:
-    """Suffixes, with their dot, of the files that `Document.open` reads."""
-    return (SUFFIX, *(f".{suffix}" for suffix in mesh_files.mesh_suffixes()))
 
 
 @contextmanager
