@@ -10,13 +10,14 @@ from imgui_bundle import imgui, implot
 
 from incpt.core.errors import OutputError
 from incpt.ui import preferences
-from incpt.ui.commands import actions
+from incpt.ui.commands import files
 from incpt.ui.display.display import Display
-from incpt.ui.display.overlays import Overlay
 from incpt.ui.editor import recovery
 from incpt.ui.editor.document import Document
 from incpt.ui.editor.editor import Editor
-from incpt.ui.viewport.viewport import Rect, Viewport
+from incpt.ui.frame import draw_picture, take_frame
+from incpt.ui.rect import Rect
+from incpt.ui.viewport.viewport import Viewport
 from incpt.ui.window import Window
 from incpt.ui.workspace import Workspace
 from incpt.viewer.threaded import ThreadedRenderer
@@ -52,15 +53,15 @@ class App:
         self.recovery = recovery.Recovery(kept.autosave_seconds)
         for complaint in complaints:
             self.editor.messages.add(complaint, "warning")
-        self._rect: Rect = (0.0, 0.0, 1.0, 1.0)
+        self._area: Rect[float] = Rect(0.0, 0.0, 1.0, 1.0)
         self.shown_frame: Frame | None = None
         self._kept = kept
-        actions.offer_recovery(self.editor, self.recovery)
+        files.offer_recovery(self.editor, self.recovery)
 
     def run(self) -> None:
         """The loop, until the window is closed."""
         try:
-            while not self.editor.is_closing:
+            while not self.editor.screen.is_closing:
                 self.turn()
         finally:
             self.close()
@@ -68,7 +69,7 @@ class App:
     def turn(self) -> None:
         """Wait for something to happen, and draw a frame if it did."""
         editor = self.editor
-        wait = 0.0 if editor.is_flying else _WAITING_SECONDS if editor.is_waiting else _IDLE_SECONDS
+        wait = 0.0 if editor.gesture.is_flying else _WAITING_SECONDS if editor.is_waiting else _IDLE_SECONDS
         is_due = self.window.wait(wait)
         if received := editor.receive():
             is_due = True
@@ -84,14 +85,14 @@ class App:
         editor, window = self.editor, self.window
         if window.wants_to_close:
             window.wants_to_close = False
-            actions.quit_(editor)
+            files.quit_(editor)
         for path in window.take_dropped():
-            editor.attempt(lambda path=path: actions.drop(editor, path))  # type: ignore[misc]
+            editor.attempt(lambda path=path: files.drop(editor, path))  # type: ignore[misc]
         if editor.frame is not None and editor.frame is not self.shown_frame:
             self.display.upload(editor.frame.pictures, editor.frame.aovs)
             self.shown_frame = editor.frame
         window.begin_frame()
-        self._rect = take_frame(editor, self.workspace, self.viewport, self.display.overlay())
+        self._area = take_frame(editor, self.workspace, self.viewport, self.display.overlay())
         window.set_title(editor.title)
         window.end_frame(self._draw_below, is_swapped)
         self._keep_preferences()
@@ -124,7 +125,7 @@ class App:
     def _draw_below(self) -> None:
         pixels = imgui.get_io().display_framebuffer_scale.x
         size = self.window.framebuffer_size
-        self.viewport.draw(self.editor, self.display, self._rect, size, pixels)
+        draw_picture(self.editor, self.display, self._area, size, pixels)
 
     def _has_message_ended(self) -> bool:
         end = self.editor.messages.next_end
@@ -140,18 +141,6 @@ class App:
 
     def _autosave(self) -> None:
         self.editor.attempt(lambda: self.recovery.update(self.editor.document, self.editor.now()))
-
-
-def take_frame(
-    editor: Editor, workspace: Workspace, viewport: Viewport, overlay: Overlay | None = None
-) -> Rect:
-    """The part of a frame between imgui's begin and end: draw everything, and take its edits. Returns the
-    rectangle of the picture, in points."""
-    rect = workspace.draw(editor)
-    is_held = viewport.update(editor, rect, overlay) or imgui.is_any_item_active()
-    editor.is_flying = viewport.is_flying
-    editor.settle(is_held)
-    return rect
 
 
 def main(file: Path | None, device: str | None) -> int:

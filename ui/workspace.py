@@ -10,14 +10,13 @@ from imgui_bundle import imgui
 from incpt.device.device import all_devices, device_name
 from incpt.scene import edits
 from incpt.scene.model import Object, Scene
-from incpt.ui.commands import actions, menus
-from incpt.ui.commands.commands import OVERLAY_NAMES
-from incpt.ui.dialogs import dialogs
+from incpt.ui.commands import camera, command, files, materials, menus, objects, rendering
 from incpt.ui.editor.editor import Editor
+from incpt.ui.editor.records import Records
 from incpt.ui.panels import display as display_panel
 from incpt.ui.panels import material as material_panel
 from incpt.ui.panels import notices, outliner, plots, render, scene_panel, tool, transform
-from incpt.ui.panels.plots import Records
+from incpt.ui.rect import Rect
 from incpt.ui.widgets import places, widgets
 from incpt.ui.widgets.widgets import Refusals
 
@@ -37,12 +36,14 @@ class Workspace:
         self._is_laid_out = False
         self._shows_first_tab = False
 
-    def draw(self, editor: Editor) -> tuple[float, float, float, float]:
-        """Draw menus, panels and dialogs; returns the rectangle that is left for the picture: left, top,
-        width, height, in points."""
+    def draw(self, editor: Editor) -> Rect[float]:
+        """Draw menus, panels and dialogs, and take what they return; returns the rectangle that is left for
+        the picture, in points."""
         places.begin_frame()
-        menus.draw_menu_bar(editor)
-        notices.draw_status_bar(editor)
+        chosen = menus.draw_menu_bar(editor)
+        if chosen is not None:
+            editor.attempt(lambda: chosen(editor))
+        notices.draw_status_bar(notices.status_text(editor.frame, editor.control.paused, editor.selection))
         rect = self._dock(editor)
         self._window("Outliner", editor, self._draw_outliner)
         self._window("Object", editor, self._draw_object)
@@ -52,23 +53,24 @@ class Workspace:
         if self._shows_first_tab:
             imgui.set_window_focus("Object")
             self._shows_first_tab = False
-        notices.draw_messages(editor, rect)
-        notices.draw_building(editor, rect)
-        dialogs.draw(editor)
-        menus.press_keys(editor)
+        _draw_notices(editor, rect)
+        _draw_dialog(editor)
+        pressed = menus.pressed_command(editor)
+        if pressed is not None:
+            command.run(editor, pressed)
         return rect
 
-    def _dock(self, editor: Editor) -> tuple[float, float, float, float]:
+    def _dock(self, editor: Editor) -> Rect[float]:
         root = imgui.get_id("incpt workspace")
         is_known = imgui.internal.dock_builder_get_node(root) is not None
-        if editor.asked_layout_reset or not (self._is_laid_out or is_known):
+        if editor.screen.wants_first_layout or not (self._is_laid_out or is_known):
             _lay_out(root)
-            editor.asked_layout_reset = False
+            editor.screen = replace(editor.screen, wants_first_layout=False)
             self._shows_first_tab = True
         self._is_laid_out = True
         imgui.dock_space_over_viewport(root, None, imgui.DockNodeFlags_.passthru_central_node)
         node = imgui.internal.dock_builder_get_central_node(root)
-        return node.pos.x, node.pos.y, node.size.x, node.size.y
+        return Rect(node.pos.x, node.pos.y, node.size.x, node.size.y)
 
     def _window(self, name: str, editor: Editor, draw: Callable[[Editor], None]) -> None:
         if imgui.begin(name, None, imgui.WindowFlags_.no_collapse)[0]:
@@ -86,7 +88,7 @@ class Workspace:
             scene = edits.set_visible(editor.scene, (outcome.switched,), not is_shown)
             editor.propose(scene, "Hide" if is_shown else "Show")
         if outcome.renaming is not None:
-            actions.rename(editor)
+            objects.rename(editor)
 
     def _draw_object(self, editor: Editor) -> None:
         name = editor.selection.active
@@ -96,7 +98,7 @@ class Workspace:
         count = len(editor.selection.names)
         new_name = widgets.text("Name", name)
         if new_name is not None:
-            editor.attempt(lambda: actions.rename_to(editor, name, new_name))
+            editor.attempt(lambda: objects.rename_to(editor, name, new_name))
             return
         if count > 1:
             widgets.note(f"{count} objects are selected; the fields show this one.")
@@ -133,14 +135,14 @@ class Workspace:
         scene = editor.scene
         with widgets.section("Camera") as is_open:
             if is_open:
-                camera = scene_panel.draw_camera(scene.camera, refusals)
-                if camera is not scene.camera:
-                    editor.propose(replace(scene, camera=camera), "Camera", _key())
+                new = scene_panel.draw_camera(scene.camera, refusals)
+                if new is not scene.camera:
+                    editor.propose(replace(scene, camera=new), "Camera", _key())
                 if widgets.button("Frame selected##camera"):
-                    actions.frame_selected(editor)
+                    camera.frame_selected(editor)
                 widgets.same_line()
                 if widgets.button("Reset##camera"):
-                    actions.reset_camera(editor)
+                    camera.reset_camera(editor)
         scene = editor.scene
         with widgets.section("Environment") as is_open:
             if is_open:
@@ -148,7 +150,7 @@ class Workspace:
                 if environment is not scene.environment:
                     editor.propose(replace(scene, environment=environment), "Environment", _key())
                 if asked.is_choose:
-                    actions.choose_environment(editor)
+                    files.choose_environment(editor)
                 if asked.is_remove:
                     editor.propose(editor.scene.with_environment(image=None), "Remove image")
         _tell(editor, refusals)
@@ -157,14 +159,10 @@ class Workspace:
         render.draw_state(editor.frame)
         self._draw_device(editor)
         imgui.separator()
-        preferences = editor.preferences
-        control = render.Control(
-            editor.paused, editor.target_spp, preferences.resolution_scale, preferences.step_ms,
-            preferences.drag_nor,
-        )  # fmt: skip
-        new, is_restart = render.draw_control(control)
         refusals = Refusals()
-        refusals.accepted(None, lambda: editor.steer(new))
+        editor.control, editor.preferences, is_restart = render.draw_control(
+            editor.control, editor.preferences, refusals
+        )
         if is_restart:
             editor.restart()
         with widgets.section("Settings of the scene") as is_open:
@@ -186,20 +184,34 @@ class Workspace:
         refusals = Refusals()
         with widgets.section("Display") as is_open:
             if is_open:
-                overlays = list(OVERLAY_NAMES.items())
-                editor.change_display(display_panel.draw(editor.preferences.display, overlays, refusals))
+                editor.change_display(display_panel.draw(editor.preferences.display, refusals))
         _tell(editor, refusals)
         with widgets.section("Measurements") as is_open:
             if is_open:
                 if editor.frame is not None:
-                    self.records.add(editor.frame, editor.now())
+                    self.records = self.records.with_frame(editor.frame, editor.now())
                 with widgets.row(
                     "Reference", "Errors are measured against the picture as it was when pinned"
                 ):
-                    label = "Unpin" if editor.is_pinned else "Pin this picture"
+                    label = "Unpin" if editor.rendering.is_pinned else "Pin this picture"
                     if widgets.button(label, enabled=editor.frame is not None):
-                        actions.pin(editor)
+                        rendering.pin(editor)
                 plots.draw(self.records, editor.preferences.step_ms)
+
+
+def _draw_notices(editor: Editor, rect: Rect[float]) -> None:
+    dismissed = notices.draw_messages(editor.messages.current(), rect)
+    if dismissed is not None:
+        editor.messages.dismiss(dismissed)
+    building = editor.rendering.building
+    if building is not None and not editor.rendering.has_failed:
+        notices.draw_building(building.done, building.total, rect)
+
+
+def _draw_dialog(editor: Editor) -> None:
+    answer = editor.dialog.draw() if editor.dialog is not None else None
+    if answer is not None:
+        editor.answer(answer)
 
 
 def _lay_out(root: int) -> None:
@@ -238,10 +250,10 @@ def _apply_material_outcome(editor: Editor, material: str, outcome: material_pan
         scene = edits.assign_material(editor.scene, editor.selection.names, outcome.assign)
         editor.propose(scene, "Assign material")
     if outcome.is_new:
-        actions.new_material(editor)
+        materials.new_material(editor)
     if outcome.is_duplicate:
-        actions.duplicate_material(editor, material)
+        materials.duplicate_material(editor, material)
     if outcome.is_delete:
         editor.propose(edits.delete_material(editor.scene, material), "Delete material")
     if outcome.is_rename:
-        actions.rename_material(editor, material)
+        materials.rename_material(editor, material)

@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core.errors import DeviceError
+from incpt.ui.rect import Rect
 
 if TYPE_CHECKING:
     from incpt.ui.app import App
@@ -74,7 +75,7 @@ def virtual_display(size: tuple[int, int] = (1440, 900)) -> Iterator[str]:
 
 
 class Hand:
-    """Mouse and keyboard on an editor. Widgets are named as `incpt.ui.places` notes them."""
+    """Mouse and keyboard on an editor. Widgets are named as `incpt.ui.widgets.places` notes them."""
 
     def __init__(self, app: App) -> None:
         self.app = app
@@ -92,8 +93,8 @@ class Hand:
             self.app.turn()
             frames -= 1
 
-    def place(self, name: str) -> tuple[float, float, float, float]:
-        """Where a widget is: left, top, right, bottom. Raises LookupError with the names there are."""
+    def place(self, name: str) -> Rect[float]:
+        """Where a widget is, in points. Raises LookupError with the names there are."""
         from incpt.ui.widgets import places
 
         rect = places.find(name)
@@ -103,13 +104,12 @@ class Hand:
 
     def middle(self, name: str) -> tuple[float, float]:
         """The middle of a widget."""
-        left, top, right, bottom = self.place(name)
-        return (left + right) / 2, (top + bottom) / 2
+        return self.place(name).middle
 
     def in_picture(self, x: float, y: float) -> tuple[float, float]:
         """The place of a point of the picture, given in units of the picture from its top left."""
-        left, top, right, bottom = self.place("picture")
-        return left + x * (right - left), top + y * (bottom - top)
+        picture = self.place("picture")
+        return picture.left + x * picture.width, picture.top + y * picture.height
 
     def show_tab(self, name: str) -> None:
         """Bring the panel of that name to the front by a click on its tab."""

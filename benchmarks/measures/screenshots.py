@@ -69,7 +69,7 @@ def opened(spp: int) -> Iterator[Hand]:
 def refine(hand: Hand, spp: int) -> None:
     """Go on until every pixel has that many samples, and rest there."""
     editor = hand.app.editor
-    editor.paused, editor.target_spp = False, spp
+    editor.control = replace(editor.control, paused=False, target_spp=spp)
 
     def is_refined() -> bool:
         frame = editor.frame
@@ -84,9 +84,9 @@ def refine(hand: Hand, spp: int) -> None:
 def stop_after(hand: Hand, tiles: int) -> None:
     """Let that many tiles of the edit be replaced, and rest there."""
     editor = hand.app.editor
-    editor.paused, editor.target_spp = False, None
+    editor.control = replace(editor.control, paused=False, target_spp=None)
     hand.pump(lambda: _is_incremental(hand) and editor.frame.pictures[-1].queue_done >= tiles, timeout=3600)  # type: ignore[union-attr]
-    editor.paused = True
+    editor.control = replace(editor.control, paused=True)
     hand.pump(lambda: editor.frame is not None and editor.frame.view.paused, timeout=60)
 
 
@@ -103,13 +103,13 @@ def turn_cube(hand: Hand) -> None:
     """The edit of the thesis's figure 5.3: the cube stands on an edge."""
     editor = hand.app.editor
     # Nothing is replaced for the first of the two values.
-    editor.paused = True
+    editor.control = replace(editor.control, paused=True)
     hand.click(f"object {OBJECT}")
-    x, y = hand.place("picture")[:2]
-    editor.point = (0.448, 0.75)
+    corner = hand.place("picture")
+    editor.control = replace(editor.control, point=(0.448, 0.75))
     hand.type_into("Position Y", "0.265")
     hand.type_into("Rotation Z", "30")
-    hand.move((x + 5, y + 5))
+    hand.move((corner.left + 5, corner.top + 5))
 
 
 # ------------------------------------------------------------------------------------------ the pictures
@@ -117,7 +117,7 @@ def turn_cube(hand: Hand) -> None:
 
 def draw_editor(hand: Hand, spp: int) -> Pixels:
     """The cube while it is turned by the gizmo."""
-    hand.app.editor.target_spp = None
+    hand.app.editor.control = replace(hand.app.editor.control, target_spp=None)
     hand.click(hand.in_picture(0.448, 0.75))
     hand.pump(lambda: hand.app.editor.selection.names == (OBJECT,), timeout=30)
     hand.key("r")
@@ -145,9 +145,8 @@ def draw_split(hand: Hand, spp: int) -> Pixels:
     editor = hand.app.editor
     hand.key("F6")
     hand.pump(lambda: editor.frame is not None and len(editor.frame.pictures) == 2, timeout=60)
-    bar, top, _, bottom = hand.place("split bar")
-    middle = (top + bottom) / 2
-    hand.drag((bar, middle), (hand.in_picture(0.452, 0.5)[0], middle))
+    bar = hand.middle("split bar")
+    hand.drag(bar, (hand.in_picture(0.452, 0.5)[0], bar[1]))
     turn_cube(hand)
     hand.key("Escape")
     hand.show_tab("Render")
@@ -212,7 +211,7 @@ def draw_method(hand: Hand, spp: int) -> Pixels:
     hand.click("Overlay")
     hand.click("Overlay: Replaced tiles")
     hand.click("Display")
-    editor.paused = True
+    editor.control = replace(editor.control, paused=True)
     hand.key("ctrl+shift+z")
     hand.key("ctrl+shift+z")
     hand.key("Escape")
@@ -232,8 +231,9 @@ PICTURES: dict[str, Callable[[Hand, int], Pixels]] = {
 def picture(hand: Hand) -> Pixels:
     """The part of the window that shows the rendered picture."""
     hand.move(hand.in_picture(0.01, 0.02))
-    left, top, right, bottom = (round(side) for side in hand.place("picture"))
-    return hand.screenshot()[top:bottom, left:right]
+    place = hand.place("picture")
+    rows, columns = slice(round(place.top), round(place.bottom)), slice(round(place.left), round(place.right))
+    return hand.screenshot()[rows, columns]
 
 
 def side_by_side(cells: Sequence[tuple[Pixels, str]]) -> Pixels:

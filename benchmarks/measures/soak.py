@@ -106,9 +106,9 @@ class Soak:
             raise SoakError("a dialog is left open")
         if editor.scene != self.model.scene:
             raise SoakError(f"not what the model has: {_difference(editor.scene, self.model.scene)}")
-        if editor.device_failed:
+        if editor.rendering.has_failed:
             raise SoakError(f"rendering stopped: {[m.text for m in editor.messages.current()]}")
-        if not editor.paused:
+        if not editor.control.paused:
             self.hand.pump(self._is_shown, frames=0, timeout=60)
 
     def _is_shown(self) -> bool:
@@ -184,7 +184,8 @@ def _drag_gizmo(soak: Soak) -> None:
     soak.hand.key(soak.random.choice("grs"))
     x, y = soak.hand.middle("gizmo")
     picture = soak.hand.place("picture")
-    if not (picture[0] + 40 < x < picture[2] - 120 and picture[1] + 40 < y < picture[3] - 40):
+    is_across = picture.left + 40 < x < picture.right - 120
+    if not (is_across and picture.top + 40 < y < picture.bottom - 40):
         return
     names = soak.hand.app.editor.selection.names
     soak.hand.drag((x + 30, y), (x + soak.random.randint(40, 100), y + soak.random.randint(-30, 30)), steps=4)
@@ -280,10 +281,10 @@ def _switch_split(soak: Soak) -> None:
 
 
 def _choose_overlay(soak: Soak) -> None:
-    from incpt.ui.commands.commands import OVERLAY_NAMES
+    from incpt.ui.panels.display import OVERLAY_TEXTS
 
     soak.hand.show_tab("Method")
-    overlay = soak.random.choice(list(OVERLAY_NAMES.values()))
+    overlay = soak.random.choice(list(OVERLAY_TEXTS.values()))
     soak.say(overlay)
     soak.hand.click("Overlay")
     soak.hand.click(f"Overlay: {overlay}")
@@ -370,11 +371,11 @@ def opened(seed: int) -> Iterator[Soak]:
         os.environ["INCPT_CONFIG_DIR"] = str(Path(folder) / "configuration")
         from incpt.ui import preferences
         from incpt.ui.app import App
-        from incpt.ui.dialogs import dialogs
+        from incpt.ui.dialogs import native
         from incpt.ui.editor.document import Document
 
         # The system's dialogs are windows of other programs, which this hand does not reach.
-        dialogs._has_native_dialogs = lambda: False
+        native.is_there = lambda: False
         preferences.save(preferences.Preferences(window_size=WINDOW, ui_scale=1.0))
         file = Path(folder) / "scene.toml"
         with as_file(files("incpt.scenes") / "editing.toml") as path:

@@ -1,6 +1,6 @@
 """The editor without a display: imgui with events by hand, a renderer that renders nothing, a clock by hand.
 
-Nothing is drawn on a screen; widgets are found by the places that they note (`ui/places.py`).
+Nothing is drawn on a screen; widgets are found by the places that they note (`ui/widgets/places.py`).
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ from imgui_bundle import imgui, implot
 from incpt.scene.image import Image
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Scene
-from incpt.ui.app import take_frame
-from incpt.ui.commands import commands, menus
+from incpt.ui.commands import command, menus, table
 from incpt.ui.editor.document import Document
 from incpt.ui.editor.editor import Editor
+from incpt.ui.frame import take_frame
 from incpt.ui.preferences import Preferences
-from incpt.ui.viewport.viewport import Rect, Viewport
+from incpt.ui.rect import Rect
+from incpt.ui.viewport.viewport import Viewport
 from incpt.ui.widgets import places, theme
 from incpt.ui.workspace import Workspace
 from incpt.viewer.threaded import NullRenderer, Renderer
@@ -50,7 +51,7 @@ class Desk:
         self.editor = Editor(Document(scene, name="test"), self._open, preferences, now=lambda: self.seconds)
         self.workspace = Workspace()
         self.viewport = Viewport()
-        self.rect: Rect = (0.0, 0.0, 1.0, 1.0)
+        self.area: Rect[float] = Rect(0.0, 0.0, 1.0, 1.0)
         self.on_frame: Callable[[], object] = lambda: None
         self.frames(3)
 
@@ -68,7 +69,7 @@ class Desk:
         """What `App.frame` does, without a window."""
         self.editor.receive()
         self._begin(seconds)
-        self.rect = take_frame(self.editor, self.workspace, self.viewport)
+        self.area = take_frame(self.editor, self.workspace, self.viewport)
         self._end()
         self.on_frame()
 
@@ -99,7 +100,7 @@ class Desk:
         """The middle of a widget, or a place that far from its left to its right."""
         rect = places.find(name)
         assert rect is not None, f"{name!r} is not shown; shown are {sorted(places.names())}"
-        x, y = rect[0] + across * (rect[2] - rect[0]), (rect[1] + rect[3]) / 2
+        x, y = rect.left + across * rect.width, rect.middle[1]
         assert 0 <= x < WINDOW[0] and 0 <= y < WINDOW[1], f"{name!r} lies outside of the window"
         return x, y
 
@@ -108,11 +109,11 @@ class Desk:
 
     def at_picture(self, x: float, y: float) -> tuple[float, float]:
         """A point of the picture, in units of it."""
-        left, top, right, bottom = self.picture
-        return left + x * (right - left), top + y * (bottom - top)
+        picture = self.picture
+        return picture.left + x * picture.width, picture.top + y * picture.height
 
     @property
-    def picture(self) -> tuple[float, float, float, float]:
+    def picture(self) -> Rect[float]:
         rect = places.find("picture")
         assert rect is not None
         return rect
@@ -224,7 +225,7 @@ class Desk:
 
     def run(self, name: str) -> None:
         """Run a command, in a frame of its own."""
-        commands.run(self.editor, commands.command(name))
+        command.run(self.editor, table.command(name))
         self.frames(2)
 
     def choose(self, name: str, text: str) -> None:
@@ -310,12 +311,10 @@ def state(editor: Editor) -> dict[str, Any]:
         **flat(editor.preferences, "preferences"),
         "selection": editor.selection.names,
         **flat(editor.tool, "tool"),
-        "paused": editor.paused,
-        "target_spp": editor.target_spp,
-        "is_pinned": editor.is_pinned,
-        "point": editor.point,
+        **flat(editor.control, "control"),
+        "is_pinned": editor.rendering.is_pinned,
         "dialog": editor.dialog,
-        "is_closing": editor.is_closing,
+        "is_closing": editor.screen.is_closing,
         "messages": tuple(message.text for message in editor.messages.current()),
     }
 

@@ -68,12 +68,12 @@ def opened(file: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hand]:
     """The editor in its window on a scene file, with a whole picture; ends by asking nobody."""
     from incpt.ui import preferences
     from incpt.ui.app import App
-    from incpt.ui.dialogs import dialogs
+    from incpt.ui.dialogs import native
     from incpt.ui.editor.document import Document
 
     monkeypatch.setenv(preferences.CONFIG_DIR, str(file.parent / "configuration"))
     # The system's dialogs are windows of other programs.
-    monkeypatch.setattr(dialogs, "_has_native_dialogs", lambda: False)
+    monkeypatch.setattr(native, "is_there", lambda: False)
     preferences.save(preferences.Preferences(window_size=WINDOW_SIZE, ui_scale=1.0))
     app = App(Document.open(file), opened=file)
     try:

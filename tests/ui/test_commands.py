@@ -18,13 +18,15 @@ from incpt.scene.selection import Selection
 from incpt.scene.shapes import SHAPES
 from incpt.ui import bindings
 from incpt.ui.bindings import Action, Button
+from incpt.ui.commands import command as command_module
 from incpt.ui.commands import menus
-from incpt.ui.commands.commands import COMMANDS, MENUS, OVERLAY_NAMES, Command, command, run
-from incpt.ui.dialogs import dialogs
-from incpt.ui.dialogs.dialogs import HelpPage
+from incpt.ui.commands.command import Command, run
+from incpt.ui.commands.table import COMMANDS, MENUS, command
+from incpt.ui.dialogs import native
+from incpt.ui.dialogs.help_page import NAVIGATION_TEXTS, HelpPage
 from incpt.ui.editor import clipboard
 from incpt.ui.editor.document import Document, new_scene
-from incpt.ui.panels.help_page import _NAVIGATION_TEXTS
+from incpt.ui.panels.display import OVERLAY_TEXTS
 from incpt.ui.preferences import NAVIGATIONS, OVERLAYS
 from incpt.viewer.threaded import Restart
 
@@ -34,7 +36,7 @@ SCENES = {"mixed": MIXED, "example": Document.example().scene, "empty": Scene()}
 
 @pytest.fixture(autouse=True)
 def no_native_dialogs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(dialogs, "_has_native_dialogs", lambda: False)
+    monkeypatch.setattr(native, "is_there", lambda: False)
     monkeypatch.setattr(clipboard, "copy_picture", lambda pixels: None)
     monkeypatch.chdir(tmp_path)
 
@@ -49,7 +51,7 @@ def test_names_and_menus() -> None:
     assert {name for name, count in Counter(one.name for one in COMMANDS).items() if count > 1} == set()
     assert {one.menu.split("/")[0] for one in COMMANDS} == set(MENUS)
     assert {shape.capitalize() for shape in SHAPES} <= {one.name for one in COMMANDS}
-    assert tuple(OVERLAY_NAMES) == OVERLAYS
+    assert tuple(OVERLAY_TEXTS) == OVERLAYS
     with pytest.raises(KeyError):
         command("nothing")
 
@@ -143,7 +145,7 @@ def test_keys_run_commands_in_both_sets(user: Desk) -> None:
 @pytest.mark.parametrize("navigation", NAVIGATIONS)
 def test_every_key_runs_its_own_command(user: Desk, navigation: str, monkeypatch: pytest.MonkeyPatch) -> None:
     ran: list[str] = []
-    monkeypatch.setattr(menus, "run", lambda editor, one: ran.append(one.name))
+    monkeypatch.setattr(command_module, "run", lambda editor, one: ran.append(one.name))
     user.editor.choose_navigation(navigation)
     wanted = [one for one in COMMANDS if one.keys_in(navigation)]
     for one in wanted:
@@ -231,7 +233,7 @@ def test_help_lists_every_key_and_move(user: Desk, navigation: str, monkeypatch:
 def test_the_set_of_keys_is_chosen_in_help(user: Desk) -> None:
     user.key("F1")
     user.frames(3)  # until the page has its size
-    user.choose("Bindings", _NAVIGATION_TEXTS["plain"])
+    user.choose("Bindings", NAVIGATION_TEXTS["plain"])
     assert user.editor.preferences.navigation == "plain" and isinstance(user.editor.dialog, HelpPage)
     user.key("Escape")
     user.run("Blender-like")
@@ -256,7 +258,7 @@ CHANGES: dict[str, set[str]] = {
     "Outline": {"preferences.display.outline"},
     "Depth": {"preferences.display.overlay"},
     "Match window": {"scene.settings.size.0", "scene.settings.size.1"},
-    "Pause": {"paused"},
+    "Pause": {"control.paused"},
     "Restart": set(),
     "Plain": {"preferences.navigation"},
     "Quit": {"is_closing"},
@@ -303,23 +305,21 @@ def test_the_camera_is_framed_and_reset(user: Desk) -> None:
 
 def test_match_window_takes_the_size_of_the_viewport(user: Desk) -> None:
     user.run("Match window")
-    assert user.scene.settings.size == (int(user.rect[2]), int(user.rect[3]))
-    assert user.picture == pytest.approx(
-        (user.rect[0], user.rect[1], user.rect[2], user.rect[1] + user.rect[3])
-    )
+    assert user.scene.settings.size == (int(user.area.width), int(user.area.height))
+    assert tuple(user.picture) == pytest.approx(tuple(user.area))
 
 
 def test_the_layout_is_reset(user: Desk) -> None:
-    rect = user.rect
+    area = user.area
     user.run("Reset layout")
-    assert not user.editor.asked_layout_reset and user.rect == rect
+    assert not user.editor.screen.wants_first_layout and user.area == area
 
 
 def test_fly_keys_are_no_commands_while_flying(user: Desk) -> None:
     user.move(*user.at_picture(0.1, 0.1))
     with user.held_keys("Shift+Grave_accent"):
         pass
-    assert user.editor.is_flying and user.editor.is_waiting
+    assert user.editor.gesture.is_flying and user.editor.is_waiting
     before = state(user.editor)
     with user.held_keys("W"):
         user.frames(3)
@@ -327,7 +327,7 @@ def test_fly_keys_are_no_commands_while_flying(user: Desk) -> None:
     changed = changes(before, state(user.editor))
     assert changed and all(place.startswith("scene.camera") for place in changed)
     user.key("Escape")
-    assert not user.editor.is_flying and user.undo_count == 1
+    assert not user.editor.gesture.is_flying and user.undo_count == 1
     assert {key.key.upper() for key in bindings.FLY_KEYS} & {one.keys for one in COMMANDS}  # they would clash
     assert bindings.action_for("blender", Button.GRAVE, ["shift"]) is Action.FLY
 
@@ -351,17 +351,20 @@ def test_no_function_of_the_panels_is_long() -> None:
     assert too_long == []
 
 
-def test_panels_know_neither_renderer_nor_opengl() -> None:
-    folder = Path(incpt.ui.__path__[0]) / "panels"
-    forbidden = (
-        "moderngl",
-        "glfw",
-        "incpt.viewer.threaded",
-        "incpt.render.session",
-        "incpt.device",
-        "incpt.ui.display",
-    )
-    for path in folder.glob("*.py"):
+RENDERER = ("moderngl", "glfw", "incpt.viewer.threaded", "incpt.render.session", "incpt.device")
+
+
+@pytest.mark.parametrize(
+    ("folder", "forbidden"),
+    [
+        ("widgets", (*RENDERER, "incpt.ui.editor", "incpt.scene")),
+        ("panels", (*RENDERER, "incpt.ui.display", "incpt.ui.editor.editor")),
+        ("dialogs", (*RENDERER, "incpt.ui.display", "incpt.ui.editor.editor")),
+        ("viewport", ("moderngl", "glfw", "incpt.render.session", "incpt.device", "incpt.ui.editor.editor")),
+    ],
+)
+def test_what_draws_values_knows_no_editor_and_no_renderer(folder: str, forbidden: tuple[str, ...]) -> None:
+    for path in (Path(incpt.ui.__path__[0]) / folder).glob("*.py"):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.ImportFrom):
                 assert not (node.module or "").startswith(forbidden), path

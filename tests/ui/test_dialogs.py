@@ -16,9 +16,10 @@ from support.ui_harness import Desk, changes, desk, flat, state
 from incpt.core.errors import OutputError
 from incpt.formats import registry, scene_save
 from incpt.scene.selection import Selection
-from incpt.ui.commands import actions
-from incpt.ui.dialogs import dialogs
-from incpt.ui.dialogs.dialogs import PathDialog, Question
+from incpt.ui.commands import files, pictures
+from incpt.ui.dialogs import native
+from incpt.ui.dialogs.path_dialog import PathDialog
+from incpt.ui.dialogs.question import Question
 from incpt.ui.editor import clipboard
 from incpt.ui.editor.document import new_scene
 from incpt.ui.editor.recovery import Recovery
@@ -30,7 +31,7 @@ OTHER = SCENE.with_camera(fov_y=33)
 
 @pytest.fixture(autouse=True)
 def alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(dialogs, "_has_native_dialogs", lambda: False)
+    monkeypatch.setattr(native, "is_there", lambda: False)
     monkeypatch.setenv("INCPT_CONFIG_DIR", str(tmp_path / "config"))
     monkeypatch.chdir(tmp_path)
 
@@ -165,8 +166,18 @@ def test_a_recent_file_is_opened_from_the_menu(user: Desk, other: Path) -> None:
         other.with_name("gone.toml")
     )
     assert user.editor.preferences.recent_files == (other,)
-    actions.open_file(user.editor, other)
+    files.open_file(user.editor, other)
     assert user.scene == OTHER
+
+
+def test_a_recent_file_that_is_broken_is_a_message(user: Desk, other: Path) -> None:
+    user.editor.preferences = user.editor.preferences.with_recent(other)
+    other.write_text("version = 9\n")
+    user.click("menu File")
+    user.move(*user.place("menu File/Open recent"))
+    user.frames(10)
+    user.click("recent other.toml")
+    assert user.scene is SCENE and len(user.texts()) == 1 and "other.toml" in user.texts()[0]
 
 
 def test_a_new_scene(user: Desk) -> None:
@@ -219,7 +230,7 @@ def test_a_place_that_is_refused_is_asked_for_again(user: Desk, tmp_path: Path, 
 
 
 def test_a_drag_under_way_is_saved_as_one_entry(user: Desk, tmp_path: Path) -> None:
-    actions._save_to(user.editor, tmp_path / "a.toml")
+    files.save_to(user.editor, tmp_path / "a.toml")
     user.editor.select(Selection(("lamp",)))
     user.frames(2)
     user.hold_at(user.place("Position X"), (40, 0))
@@ -235,9 +246,9 @@ def test_a_drag_under_way_is_saved_as_one_entry(user: Desk, tmp_path: Path) -> N
 
 def leave(user: Desk, how: str, other: Path) -> None:
     if how == "drop":
-        user.editor.attempt(lambda: actions.drop(user.editor, other))
+        user.editor.attempt(lambda: files.drop(user.editor, other))
     elif how == "recent":
-        actions.open_file(user.editor, other)
+        files.open_file(user.editor, other)
     else:
         user.key(how)
     user.frames(3)
@@ -245,7 +256,7 @@ def leave(user: Desk, how: str, other: Path) -> None:
 
 def has_left(user: Desk, how: str) -> bool:
     if how == "Ctrl+Q":
-        return user.editor.is_closing
+        return user.editor.screen.is_closing
     if how == "Ctrl+O":
         return isinstance(user.editor.dialog, PathDialog)
     return user.scene == (new_scene() if how == "Ctrl+N" else OTHER)
@@ -281,7 +292,7 @@ def test_changes_are_thrown_away_when_told_so(user: Desk, how: str, other: Path)
 
 @pytest.mark.parametrize("how", WAYS)
 def test_changes_are_saved_first(user: Desk, how: str, other: Path, tmp_path: Path) -> None:
-    actions._save_to(user.editor, tmp_path / "mine.toml")
+    files.save_to(user.editor, tmp_path / "mine.toml")
     edit(user)
     scene = user.scene
     leave(user, how, other)
@@ -308,13 +319,13 @@ def test_giving_up_the_place_gives_up_leaving(user: Desk, tmp_path: Path) -> Non
     answer(user, "x", end="Escape")
     if user.editor.dialog is not None:
         user.key("Escape")
-    assert user.editor.dialog is None and not user.editor.is_closing and user.scene is scene
+    assert user.editor.dialog is None and not user.editor.screen.is_closing and user.scene is scene
 
 
 def test_what_cannot_be_saved_is_not_left(
     user: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    actions._save_to(user.editor, tmp_path / "mine.toml")
+    files.save_to(user.editor, tmp_path / "mine.toml")
     edit(user)
 
     def fail(*_: object) -> None:
@@ -323,17 +334,17 @@ def test_what_cannot_be_saved_is_not_left(
     monkeypatch.setattr(scene_save, "save", fail)
     user.key("Ctrl+Q")
     choose(user, "Save")
-    assert not user.editor.is_closing and user.editor.document.is_dirty
+    assert not user.editor.screen.is_closing and user.editor.document.is_dirty
     assert "the disk is full" in user.texts()
 
 
 def test_enter_takes_the_first_answer(user: Desk, tmp_path: Path) -> None:
-    actions._save_to(user.editor, tmp_path / "mine.toml")
+    files.save_to(user.editor, tmp_path / "mine.toml")
     edit(user)
     user.key("Ctrl+Q")
     user.frames(3)
     user.key("Enter")
-    assert user.editor.is_closing and registry.load(tmp_path / "mine.toml") == user.scene
+    assert user.editor.screen.is_closing and registry.load(tmp_path / "mine.toml") == user.scene
 
 
 # ---------------------------------------------------------------------------------------- dropped, imported
@@ -342,7 +353,7 @@ def test_enter_takes_the_first_answer(user: Desk, tmp_path: Path) -> None:
 def test_a_dropped_mesh_is_added_and_selected(user: Desk, tmp_path: Path) -> None:
     path = tmp_path / "tri.obj"
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 2\n")
-    assert user.editor.attempt(lambda: actions.drop(user.editor, path))
+    assert user.editor.attempt(lambda: files.drop(user.editor, path))
     assert user.editor.selection.names == ("tri",) and user.undo_count == 1
     assert len(user.texts()) == 1 and "tri.obj" in user.texts()[0]
     user.key("Ctrl+Z")
@@ -357,7 +368,7 @@ def test_a_dropped_image_lights_the_scene(user: Desk, tmp_path: Path) -> None:
     pixels = np.full((4, 8, 3), 0.5, np.float32)
     OpenEXR.File({"type": OpenEXR.scanlineimage}, {"RGB": pixels}).write(str(path))
     user.editor.select(Selection(("lamp",)))
-    assert user.editor.attempt(lambda: actions.drop(user.editor, path))
+    assert user.editor.attempt(lambda: files.drop(user.editor, path))
     assert user.scene.environment.image is not None and user.editor.selection.names == ("lamp",)
     assert all(place.startswith("environment.") for place in changes(flat(SCENE), flat(user.scene)))
     user.key("Ctrl+Z")
@@ -374,7 +385,7 @@ def test_what_cannot_be_used_is_a_message(user: Desk, tmp_path: Path, name: str)
     if "gone" not in name:
         path.write_bytes(b"\x00garbage")
     before, views = state(user.editor), len(user.null.views)
-    assert not user.editor.attempt(lambda: actions.drop(user.editor, path))
+    assert not user.editor.attempt(lambda: files.drop(user.editor, path))
     user.frames(2)
     assert changes(before, state(user.editor)) == {"messages"} and name in user.texts()[0]
     assert all(view.scene is SCENE for view in user.null.views[views:]) and user.undo_count == 0
@@ -384,7 +395,7 @@ def test_what_cannot_be_used_is_a_message(user: Desk, tmp_path: Path, name: str)
 
 
 def test_the_picture_is_exported_to_the_path(user: Desk, tmp_path: Path) -> None:
-    actions.export_picture(user.editor)
+    pictures.export_picture(user.editor)
     user.frames(2)
     assert isinstance(user.editor.dialog, PathDialog) and user.editor.dialog.text == f"{tmp_path}/test.png"
     answer(user, "a.gif")
@@ -392,7 +403,7 @@ def test_the_picture_is_exported_to_the_path(user: Desk, tmp_path: Path) -> None
     answer(user, "a.exr")
     assert user.null.requests == [Export(tmp_path / "a.exr", True, 0.0, "agx")]
     (tmp_path / "b.png").write_bytes(b"")
-    actions.export_picture(user.editor)
+    pictures.export_picture(user.editor)
     answer(user, "b.png")
     assert isinstance(user.editor.dialog, Question) and len(user.null.requests) == 1
     choose(user, "Replace")
@@ -430,14 +441,14 @@ def crashed(tmp_path: Path) -> Path:
 
 
 def test_nothing_is_asked_after_a_clean_end(user: Desk) -> None:
-    actions.offer_recovery(user.editor, Recovery(1.0))
+    files.offer_recovery(user.editor, Recovery(1.0))
     assert user.editor.dialog is None
 
 
 @pytest.mark.parametrize("choice", ["Recover", "Discard", "Later"])
 def test_what_a_crash_left_is_offered(user: Desk, crashed: Path, tmp_path: Path, choice: str) -> None:
     kept = Recovery(1.0)
-    actions.offer_recovery(user.editor, kept)
+    files.offer_recovery(user.editor, kept)
     assert isinstance(user.editor.dialog, Question) and "mine.toml" in user.editor.dialog.text
     choose(user, choice)
     assert user.editor.dialog is None and crashed.exists() == (choice == "Later")
@@ -451,7 +462,7 @@ def test_what_a_crash_left_is_offered(user: Desk, crashed: Path, tmp_path: Path,
 def test_a_recovery_file_that_is_broken_stays_and_is_a_message(user: Desk, crashed: Path) -> None:
     crashed.write_text("version = 9\n")
     kept = Recovery(1.0)
-    actions.offer_recovery(user.editor, kept)
+    files.offer_recovery(user.editor, kept)
     choose(user, "Recover")
     assert user.scene is SCENE and crashed.exists() and len(user.texts()) == 1
     kept.remove()
@@ -478,9 +489,9 @@ class Native:
 def test_the_systems_own_dialog_is_used_where_there_is_one(
     user: Desk, other: Path, monkeypatch: pytest.MonkeyPatch, as_list: bool
 ) -> None:
-    monkeypatch.setattr(dialogs, "_has_native_dialogs", lambda: True)
+    monkeypatch.setattr(native, "is_there", lambda: True)
     answers: list[object] = [[], "", [str(other)] if as_list else str(other)]
-    monkeypatch.setattr(dialogs, "_native_dialog", lambda *_: Native(answers.pop(0)))
+    monkeypatch.setattr(native.portable_file_dialogs, "open_file", lambda *_: Native(answers.pop(0)))
     for _ in range(2):
         user.key("Ctrl+O")
         user.frames(5)

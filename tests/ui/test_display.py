@@ -28,8 +28,10 @@ if os.environ.get("CI"):
 else:
     moderngl = pytest.importorskip("moderngl", reason="the editor's packages are not installed")
 
-from incpt.ui.display.display import Display, split_x
+from incpt.ui.display.display import Display
 from incpt.ui.display.outline import ACTIVE, SELECTED, Outlined, is_closed
+from incpt.ui.display.projection import split_x
+from incpt.ui.rect import Rect
 
 CLEAR = (51, 51, 51)
 PLAIN = DisplaySettings(curve="srgb", outline=False)
@@ -61,7 +63,7 @@ class Screen:
         self.display = Display(context)
 
     def draw(
-        self, rect: tuple[float, float, float, float], settings: DisplaySettings = PLAIN, **more: Any
+        self, rect: Rect[float], settings: DisplaySettings = PLAIN, **more: Any
     ) -> npt.NDArray[np.uint8]:
         """(h, w, 3), row 0 on top."""
         self._framebuffer.use()
@@ -121,7 +123,7 @@ def test_the_screen_shows_what_a_png_holds(screen: Any, curve: str, exposure: fl
     rgb[1, 4:8] = [[np.nan, 1, 1], [1, 1, -np.nan], [1e38, 1e-38, 1e-44], [65504, 65505, 1e6]]
     window = screen(64, 64)
     window.display.upload([picture(rgb)])
-    shown = window.draw((0, 0, 64, 64), replace(PLAIN, curve=curve, exposure=exposure))
+    shown = window.draw(Rect(0, 0, 64, 64), replace(PLAIN, curve=curve, exposure=exposure))
     assert_same(shown, tone_map(rgb, exposure, curve))
 
 
@@ -130,15 +132,15 @@ def test_pixels_keep_their_places_and_clipping_holds(screen: Any) -> None:
     window = screen(64, 48)
     window.display.upload([picture(rgb)])
     blocks = mapped(rgb).repeat(4, axis=0).repeat(4, axis=1)
-    shown = window.draw((-8, 12, 80, 40))
+    shown = window.draw(Rect(-8, 12, 80, 40))
     assert_same(shown[12:], blocks[:36, 8:72])
     assert (shown[:12] == CLEAR).all()
-    shown = window.draw((-8, 12, 80, 40), clip_px=(10, 20, 30, 8))
+    shown = window.draw(Rect(-8, 12, 80, 40), clip_px=Rect(10, 20, 30, 8))
     assert_same(shown[20:28, 10:40], blocks[8:16, 18:48])
     outside = np.ones(shown.shape[:2], bool)
     outside[20:28, 10:40] = False
     assert (shown[outside] == CLEAR).all()
-    for nowhere in ((100, 0, 80, 40), (3.5, 3.5, 0, 9), (0, 0, 9, float("nan"))):
+    for nowhere in (Rect(100, 0, 80, 40), Rect(3.5, 3.5, 0, 9), Rect(0, 0, 9, float("nan"))):
         assert (window.draw(nowhere) == CLEAR).all()
 
 
@@ -146,7 +148,7 @@ def test_far_magnification_shows_the_right_pixel(screen: Any) -> None:
     rgb = noise(20, 10)
     window = screen(30, 20)
     window.display.upload([picture(rgb)])
-    shown = window.draw((-1000 * 7 - 500, -1000 * 3 - 500, 20_000, 10_000))
+    shown = window.draw(Rect(-1000 * 7 - 500, -1000 * 3 - 500, 20_000, 10_000))
     assert_same(shown, np.broadcast_to(mapped(rgb)[3, 7], shown.shape))
 
 
@@ -155,13 +157,13 @@ def test_pixels_are_squares_from_twofold_magnification(screen: Any) -> None:
     rgb[:, 4:] = 1
     window = screen(64, 64)
     window.display.upload([picture(rgb)])
-    assert set(np.unique(window.draw((0, 0, 16, 16))[:16, :16])) == {0, 255}
-    assert len(np.unique(window.draw((0, 0, 15, 15))[:15, :15])) > 2
+    assert set(np.unique(window.draw(Rect(0, 0, 16, 16))[:16, :16])) == {0, 255}
+    assert len(np.unique(window.draw(Rect(0, 0, 15, 15))[:15, :15])) > 2
 
 
 def test_a_new_exposure_or_picture_is_shown_and_the_same_array_is_not_sent_again(screen: Any) -> None:
     first, second = picture(noise(16, 8)), picture(noise(16, 8)[::-1])
-    window, rect = screen(16, 8), (0, 0, 16, 8)
+    window, rect = screen(16, 8), Rect(0, 0, 16, 8)
     for shown in (first, second, first):
         window.display.upload([shown])
         assert_same(window.draw(rect), mapped(shown.image[..., :3]))
@@ -180,7 +182,7 @@ def test_the_preview_shows_until_its_successor_is_complete(screen: Any) -> None:
     alpha[:4] = 1
     half, whole = (picture(np.broadcast_to(blue, (8, 16, 3)), alpha=a) for a in (alpha, 1.0))
     later = picture(np.broadcast_to(blue, (8, 16, 3)), alpha=alpha)
-    window, rect = screen(16, 8), (0, 0, 16, 8)
+    window, rect = screen(16, 8), Rect(0, 0, 16, 8)
     window.display.upload([preview])
     assert_same(window.draw(rect), np.broadcast_to(mapped(red), (8, 16, 3)))
     window.display.upload([half])
@@ -198,15 +200,17 @@ def test_the_preview_shows_until_its_successor_is_complete(screen: Any) -> None:
     assert_same(window.draw(rect)[4:], np.broadcast_to(background, (4, 16, 3)))
 
 
-@pytest.mark.parametrize("rect", [(0, 0, 111, 63), (3.3, 2.6, 150.9, 85.7), (-40.25, -20.5, 444, 250.9)])
-def test_each_tile_line_is_one_pixel_wide(screen: Any, rect: tuple[float, float, float, float]) -> None:
+@pytest.mark.parametrize(
+    "rect", [Rect(0, 0, 111, 63), Rect(3.3, 2.6, 150.9, 85.7), Rect(-40.25, -20.5, 444, 250.9)]
+)
+def test_each_tile_line_is_one_pixel_wide(screen: Any, rect: Rect[float]) -> None:
     window = screen(160, 90)
     window.display.upload([picture(np.full((28, 44, 3), 0.05), tile_size=9)])
     plain = window.draw(rect)
     lines = (window.draw(rect, replace(PLAIN, tile_grid=True)) != plain).any(axis=-1)
     inside = (plain != CLEAR).any(axis=-1)
-    columns = [int(np.floor(rect[0] + k * 9 * rect[2] / 44)) for k in range(1, 5)]
-    rows = [int(np.floor(rect[1] + k * 9 * rect[3] / 28)) for k in range(1, 4)]
+    columns = [int(np.floor(rect.left + k * 9 * rect.width / 44)) for k in range(1, 5)]
+    rows = [int(np.floor(rect.top + k * 9 * rect.height / 28)) for k in range(1, 4)]
     expected = np.zeros_like(lines)
     expected[:, [c for c in columns if 0 <= c < 160]] = True
     expected[[r for r in rows if 0 <= r < 90]] = True
@@ -219,11 +223,13 @@ def test_tile_lines_contrast_with_what_they_cross_and_fade_when_dense(screen: An
     window = screen(128, 128)
     window.display.upload([picture(rgb)])
     with_grid, plain = (
-        window.draw((0, 0, 128, 128), replace(PLAIN, tile_grid=on)).astype(int) for on in (True, False)
+        window.draw(Rect(0, 0, 128, 128), replace(PLAIN, tile_grid=on)).astype(int) for on in (True, False)
     )
     changed = (with_grid - plain)[5, :, 0]
     assert changed[32] > 40 and changed[96] < -40
-    assert (window.draw((0, 0, 10, 10), replace(PLAIN, tile_grid=True)) == window.draw((0, 0, 10, 10))).all()
+    assert (
+        window.draw(Rect(0, 0, 10, 10), replace(PLAIN, tile_grid=True)) == window.draw(Rect(0, 0, 10, 10))
+    ).all()
 
 
 def first_hits(width: int, height: int) -> Aovs:
@@ -234,7 +240,7 @@ def first_hits(width: int, height: int) -> Aovs:
 
 def test_overlays_lie_on_their_pixels_and_blend(screen: Any) -> None:
     shown, aovs = picture(noise(44, 28), tile_size=9), first_hits(44, 28)
-    window, rect = screen(88, 56), (0, 0, 88, 56)
+    window, rect = screen(88, 56), Rect(0, 0, 88, 56)
     window.display.upload([shown], aovs)
     for kind in ("object_ids", "queue"):
         overlay = overlays.build(kind, shown, aovs)
@@ -255,7 +261,7 @@ def test_overlays_lie_on_their_pixels_and_blend(screen: Any) -> None:
 
 
 def test_an_overlay_follows_its_picture(screen: Any) -> None:
-    window, rect = screen(44, 28), (0, 0, 44, 28)
+    window, rect = screen(44, 28), Rect(0, 0, 44, 28)
     settings = replace(PLAIN, overlay="replaced")
     shown = picture(np.full((28, 44, 3), 0.2))
     window.display.upload([shown])
@@ -269,7 +275,7 @@ def test_an_overlay_follows_its_picture(screen: Any) -> None:
 
 def test_a_split_view_shows_both_sides_and_a_bar(screen: Any) -> None:
     left, right = picture(np.full((60, 80, 3), 0.02)), picture(np.full((60, 80, 3), 0.3))
-    window, rect = screen(90, 60), (6, 0, 80, 60)
+    window, rect = screen(90, 60), Rect(6, 0, 80, 60)
     window.display.upload([left, right])
     dark, bright = int(mapped([[0.02] * 3])[0, 0]), int(mapped([[0.3] * 3])[0, 0])
     shown = window.draw(rect, replace(PLAIN, split=True, split_position=0.25))
@@ -300,9 +306,7 @@ def outlined(scene: Scene, *names: str, active: str | None = None) -> Outlined:
     return Outlined(scene, frozenset(names), active)
 
 
-def mask_at(
-    window: Screen, rect: tuple[float, float, float, float], selection: Outlined
-) -> npt.NDArray[np.uint8]:
+def mask_at(window: Screen, rect: Rect[float], selection: Outlined) -> npt.NDArray[np.uint8]:
     """(h, w) of the screen."""
     window.draw(rect, replace(PLAIN, outline=True), selection=selection)
     part, (x, y, width, height) = window.display.outline.mask()
@@ -329,7 +333,7 @@ def test_the_mask_is_what_the_path_tracer_sees(screen: Any, device: Device, scen
     window = screen(96, 64)
     window.display.upload([picture(noise(96, 64))])
     name = scene.objects[0].name
-    mask = mask_at(window, (0, 0, 96, 64), outlined(scene, name, active=name)) > 0
+    mask = mask_at(window, Rect(0, 0, 96, 64), outlined(scene, name, active=name)) > 0
     assert seen.sum() > 100
     assert (mask != seen).sum() <= EDGE_PIXELS
 
@@ -339,7 +343,7 @@ def test_the_mask_follows_zoom_and_pan(screen: Any, device: Device) -> None:
     seen = Session(scene, size=(384, 256), device=device).aovs().object_id >= 0
     window = screen(120, 90)
     window.display.upload([picture(noise(96, 64))])
-    mask = mask_at(window, (-70, -110, 384, 256), outlined(scene, "grey drum")) > 0
+    mask = mask_at(window, Rect(-70, -110, 384, 256), outlined(scene, "grey drum")) > 0
     expected = seen[110:200, 70:190]
     assert 0.2 < expected.mean() < 0.8 and (mask != expected).sum() <= EDGE_PIXELS
 
@@ -361,7 +365,7 @@ def is_color(shown: npt.NDArray[np.uint8], color: tuple[float, float, float]) ->
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])
 def test_the_line_is_outside_two_pixels_wide_and_follows_a_drag(screen: Any, scale: float) -> None:
-    scene, rect = lone("red cube", rotation=(0, 0, 0)), (0, 0, 192, 128)
+    scene, rect = lone("red cube", rotation=(0, 0, 0)), Rect(0, 0, 192, 128)
     window = screen(192, 128)
     window.display.upload([picture(np.full((64, 96, 3), 0.2))])
     settings = replace(PLAIN, outline=True)
@@ -385,7 +389,7 @@ def test_the_line_is_outside_two_pixels_wide_and_follows_a_drag(screen: Any, sca
 
 
 def test_the_active_object_is_brighter(screen: Any) -> None:
-    scene, rect = mixed_scene(), (0, 0, 176, 112)
+    scene, rect = mixed_scene(), Rect(0, 0, 176, 112)
     window = screen(176, 112)
     window.display.upload([picture(np.full((28, 44, 3), 0.2))])
     both = outlined(scene, "red cube", "grey drum", active="red cube")
@@ -396,7 +400,7 @@ def test_the_active_object_is_brighter(screen: Any) -> None:
 
 
 def test_meshes_are_kept_only_while_selected(screen: Any) -> None:
-    scene, rect = mixed_scene(), (0, 0, 44, 28)
+    scene, rect = mixed_scene(), Rect(0, 0, 44, 28)
     window = screen(44, 28)
     window.display.upload([picture(noise(44, 28))])
     counts = []
@@ -425,7 +429,7 @@ def test_everything_is_given_back(context: Any) -> None:
         settings = DisplaySettings(overlay="queue", tile_grid=True, split=True)
         for shown in (small, large):
             window.display.upload([shown, shown], first_hits(44, 28))
-            window.draw((0, 0, 88, 56), settings, selection=outlined(mixed_scene(), "red cube"))
+            window.draw(Rect(0, 0, 88, 56), settings, selection=outlined(mixed_scene(), "red cube"))
         window.release()
         del window
         assert len(context.objects) > 15

@@ -20,7 +20,7 @@ from incpt.render.modes import Mode
 from incpt.scene import edits
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
-from incpt.ui.commands import actions, commands
+from incpt.ui.commands import command, materials, objects, pictures, table
 from incpt.ui.editor.messages import Messages
 from incpt.ui.panels.notices import status_text
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
@@ -144,7 +144,10 @@ def test_a_click_picks_and_clicks_on_nothing_deselect(user: Desk) -> None:
         user.click_at(*where, button)
         (request,) = user.null.requests
         assert isinstance(request, Pick) and not request.additive
-        assert request.point == pytest.approx((0.5, 0.5), abs=2e-3) and user.editor.point == request.point
+        assert (
+            request.point == pytest.approx((0.5, 0.5), abs=2e-3)
+            and user.editor.control.point == request.point
+        )
         tell(user, Picked(request.point, "red cube", False))
         assert user.editor.selection.names == ("red cube",)
         user.null.requests.clear()
@@ -170,14 +173,14 @@ def test_ctrl_picks_more_than_one(user: Desk) -> None:
 
 
 def test_a_click_beside_the_picture_deselects(user: Desk) -> None:
-    beside = (user.rect[0] + 20, user.rect[1] + 20)
-    assert beside[1] < user.picture[1]
+    beside = (user.area.left + 20, user.area.top + 20)
+    assert beside[1] < user.picture.top
     user.editor.select(Selection(("lamp",)))
     with user.held_keys("Ctrl"):
         user.click_at(*beside)
     assert user.editor.selection.names == ("lamp",)
     user.click_at(*beside)
-    assert user.editor.selection.names == () and not user.null.requests and user.editor.point is None
+    assert user.editor.selection.names == () and not user.null.requests and user.editor.control.point is None
 
 
 def test_a_pick_of_what_is_gone_selects_nothing(user: Desk) -> None:
@@ -217,7 +220,7 @@ def test_a_drag_moves_the_camera(
     changed = changes(flat(SCENE), flat(user.scene))
     assert changed and all(place.startswith("camera.") for place in changed)
     assert user.editor.document.history.undo_label == label and user.undo_count == 1
-    assert not user.null.requests and not user.editor.is_flying
+    assert not user.null.requests and not user.editor.gesture.is_flying
     user.key("Ctrl+Z")
     assert user.scene == SCENE
 
@@ -348,12 +351,12 @@ def test_the_camera_moves_with_the_gizmo_under_the_mouse(user: Desk) -> None:
 def test_the_bar_of_the_split_view_is_dragged(user: Desk) -> None:
     user.run("Split view")
     before = state(user.editor)
-    left, _, right, _ = user.picture
-    user.drag("split bar", (right - left) / 4)
+    width = user.picture.width
+    user.drag("split bar", width / 4)
     after = state(user.editor)
     assert changes(before, after) == {"preferences.display.split_position"}
     assert after["preferences.display.split_position"] == pytest.approx(0.75, abs=0.01)
-    user.drag("split bar", right - left)
+    user.drag("split bar", width)
     assert user.editor.preferences.display.split_position == 1.0
     assert not user.null.requests and user.undo_count == 0
 
@@ -428,18 +431,22 @@ def test_a_problem_is_a_message_and_nothing_else(user: Desk) -> None:
 
 def test_after_a_fatal_problem_the_scene_is_still_edited_and_restart_opens_the_device(user: Desk) -> None:
     tell(user, Building(1, 3), Problem("the device is gone", fatal=True))
-    assert user.editor.device_failed and not user.shows("building") and user.texts() == ["the device is gone"]
+    assert (
+        user.editor.rendering.has_failed
+        and not user.shows("building")
+        and user.texts() == ["the device is gone"]
+    )
     user.run("Cube")
     assert user.undo_count == 1 and user.devices == [None]
     user.run("Restart")
-    assert user.devices == [None, None] and user.null.closed and not user.editor.device_failed
+    assert user.devices == [None, None] and user.null.closed and not user.editor.rendering.has_failed
     assert user.null.views[-1].scene == user.scene
 
 
 def test_another_device_is_opened(user: Desk) -> None:
-    user.editor.is_pinned = True
+    user.editor.rendering = replace(user.editor.rendering, is_pinned=True)
     user.editor.change_device("other")
-    assert user.devices == [None, "other"] and user.null.closed and not user.editor.is_pinned
+    assert user.devices == [None, "other"] and user.null.closed and not user.editor.rendering.is_pinned
 
 
 def test_what_was_exported_is_said_for_a_while(user: Desk, tmp_path: Path) -> None:
@@ -457,21 +464,24 @@ def test_pinning_and_exporting_ask_the_renderer(user: Desk, tmp_path: Path) -> N
     user.click("Unpin")
     user.editor.change_display(DisplaySettings(exposure=2.0, curve="filmic"))
     path = tmp_path / "a.png"
-    actions.export_to(user.editor, path)
+    pictures.export_to(user.editor, path)
     assert user.null.requests == [Pin(True), Pin(False), Export(path, True, 2.0, "filmic")]
     with pytest.raises(InputError, match="png"):
-        actions.export_to(user.editor, tmp_path / "a.gif")
+        pictures.export_to(user.editor, tmp_path / "a.gif")
 
 
 def test_the_status_says_mode_samples_and_selection(user: Desk) -> None:
-    assert status_text(user.editor) == ""
+    def status() -> str:
+        return status_text(user.editor.frame, user.editor.control.paused, user.editor.selection)
+
+    assert status() == ""
     tell(user, frame_of(user.editor.view, Mode.INCREMENTAL, 1234, 0.5))
     user.editor.select(Selection(("lamp",)))
-    assert "Incremental" in status_text(user.editor) and "1,234" in status_text(user.editor)
-    assert "0.50000" in status_text(user.editor) and status_text(user.editor).endswith("lamp")
+    assert "Incremental" in status() and "1,234" in status()
+    assert "0.50000" in status() and status().endswith("lamp")
     user.run("Pause")
     user.run("Select all")
-    assert status_text(user.editor).startswith("Paused") and "5 objects" in status_text(user.editor)
+    assert status().startswith("Paused") and "5 objects" in status()
 
 
 def test_every_panel_shows_a_frame_of_either_kind(user: Desk) -> None:
@@ -518,9 +528,9 @@ def test_another_document_starts_over(user: Desk) -> None:
     from incpt.ui.editor.document import Document
 
     user.editor.select(Selection(("lamp",)))
-    user.editor.point = (0.5, 0.5)
+    user.editor.control = replace(user.editor.control, point=(0.5, 0.5))
     user.editor.start_over(Document(Scene(), name="x", warnings=("lost something",)))
-    assert user.editor.selection.names == () and user.editor.point is None
+    assert user.editor.selection.names == () and user.editor.control.point is None
     assert user.texts() == ["lost something"] and user.editor.title == "x - incpt"
     user.frames(2)
     assert user.null.views[-1].scene == Scene() and user.undo_count == 0
@@ -575,11 +585,11 @@ def act_on(user: Desk, name: str, kind: str, value: Any) -> None:
     elif kind == "move":
         editor.propose(editor.scene.with_object(name, position=(value, 0, 0)), "Move")
     elif kind == "rename":
-        editor.attempt(lambda: actions.rename_to(editor, name, value))
+        editor.attempt(lambda: objects.rename_to(editor, name, value))
     elif value == "new":
-        actions.new_material(editor)
+        materials.new_material(editor)
     elif value == "copy":
-        actions.duplicate_material(editor, material)
+        materials.duplicate_material(editor, material)
     elif value == "delete":
         editor.attempt(lambda: editor.propose(edits.delete_material(editor.scene, material), "Delete"))
     elif value == "assign":
@@ -611,9 +621,9 @@ def test_undo_and_redo_lead_through_the_same_scenes(sequence: list[tuple[str, An
             assert user.null.views[-1].scene == user.scene
         scenes = [user.scene]
         while history.can_undo:
-            commands.run(user.editor, commands.command("Undo"))
+            command.run(user.editor, table.command("Undo"))
             scenes.append(user.scene)
         assert user.scene == SCENE and not user.editor.document.is_dirty
         for scene in scenes[-2::-1]:
-            commands.run(user.editor, commands.command("Redo"))
+            command.run(user.editor, table.command("Redo"))
             assert user.scene == scene

@@ -17,7 +17,7 @@ from incpt.render.session import Session, StepReport
 from incpt.scene import edits
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
-from incpt.ui.commands import actions
+from incpt.ui.commands import files, objects
 from incpt.ui.preferences import DisplaySettings, Preferences
 from incpt.viewer.threaded import Message, Pick, Picked, Request, Restart
 from incpt.viewer.viewer import Frame, Live, View
@@ -211,7 +211,7 @@ AFTER: dict[str, tuple[Callable[[Desk], object], Mode]] = {
     "outline": (command("Outline"), REFINE),
     "selection": (command("Select all"), REFINE),
     "click": (lambda user: user.click_at(*user.at_picture(0.5, 0.5)), REFINE),
-    "rename": (lambda user: actions.rename_to(user.editor, "red cube", "a"), REFINE),
+    "rename": (lambda user: objects.rename_to(user.editor, "red cube", "a"), REFINE),
     "rename material": (
         edit(lambda scene: edits.rename_material(scene, "red", "paint")),
         REFINE,
@@ -330,7 +330,7 @@ def test_a_new_document_starts_over(table: Table, tmp_path: Path) -> None:
 
     path = tmp_path / "other.toml"
     scene_save.save(SCENE.without_object("lamp"), path)
-    mode, _ = mode_after(table, lambda user: actions.open_file(user.editor, path))
+    mode, _ = mode_after(table, lambda user: files.open_file(user.editor, path))
     assert mode in (BASE, INCREMENTAL) and table.renderer.view is not None
     table.settle()
     assert table.renderer.session.scene == table.user.scene

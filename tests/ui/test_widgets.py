@@ -81,7 +81,7 @@ FIELDS = [
     Field("Render", "Seed", "scene.settings.seed", "12345", 12345, dragged=60),
     Field("Render", "Width", "scene.settings.size.0", "100", 100, dragged=60),
     Field("Render", "Height", "scene.settings.size.1", "70", 70, dragged=60),
-    Field("Render", "Target spp", "target_spp", "128", 128),
+    Field("Render", "Target spp", "control.target_spp", "128", 128),
     Field("Render", "Resolution", "preferences.resolution_scale", "50", 0.5),
     Field("Render", "Step time", "preferences.step_ms", "20", 20),
     Field("Render", "NoR in a drag", "preferences.drag_nor", "32", 32, dragged=60),
@@ -118,7 +118,7 @@ BUTTONS = [
     ("Object", "Delete##material", {"messages"}),
     ("Scene", "Remove##image", {"scene.environment.image"}),
     ("Scene", "Choose…##image", {"dialog"}),
-    ("Render", "Pause", {"paused"}),
+    ("Render", "Pause", {"control.paused"}),
     ("Render", "Restart", set()),
 ]
 
@@ -507,6 +507,6 @@ def test_a_number_that_no_widget_offers_stays(user: Desk) -> None:
 def test_pinning_asks_the_renderer(user: Desk) -> None:
     turn_to(user, "Method")
     user.click("Pin this picture")
-    assert not user.editor.is_pinned and user.null.requests == []  # there is no picture yet
+    assert not user.editor.rendering.is_pinned and user.null.requests == []  # there is no picture yet
     user.run("Pin reference")
     assert user.null.requests == [] and Pin(True) not in user.null.requests

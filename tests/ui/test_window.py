@@ -242,10 +242,9 @@ def test_the_split_view_shows_both_strategies_and_its_bar_is_dragged(hand: Hand,
     left, right = (picture.image[..., :3].mean(axis=(0, 1)) for picture in editor.frame.pictures)
     assert left == pytest.approx(right, rel=0.05), "both sides show the same scene"
     assert editor.frame.pictures[0].seconds > 0
-    bar, top, _, bottom = hand.place("split bar")
-    hand.drag((bar, (top + bottom) / 2), (bar - 120, (top + bottom) / 2))
-    picture_left, _, picture_right, _ = hand.place("picture")
-    position = (bar - 120 - picture_left) / (picture_right - picture_left)
+    bar, y = hand.middle("split bar")
+    hand.drag((bar, y), (bar - 120, y))
+    position = hand.place("picture").relative((bar - 120, y))[0]
     assert editor.preferences.display.split_position == pytest.approx(position, abs=0.01)
     keep(hand, "8-split")
     hand.key("F6")
@@ -264,11 +263,11 @@ def test_closing_asks_about_unsaved_changes(hand: Hand, file: Path) -> None:
     hand.key("ctrl+q")
     keep(hand, "9-question")
     hand.click("Cancel")
-    assert editor.dialog is None and not editor.is_closing
+    assert editor.dialog is None and not editor.screen.is_closing
     hand.close_window()
-    assert editor.dialog is not None and not editor.is_closing
+    assert editor.dialog is not None and not editor.screen.is_closing
     hand.click("Save")
-    assert editor.is_closing and registry.load(file) == editor.scene
+    assert editor.screen.is_closing and registry.load(file) == editor.scene
 
 
 def test_the_editor_runs_as_a_program_of_its_own(display: str, file: Path, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The menu bar and the keys, both from the table of commands."""
+"""The menu bar and the keys, both from the table of commands. They return what the user chose."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from itertools import groupby
 
 from imgui_bundle import imgui
 
-from incpt.ui.commands import actions
-from incpt.ui.commands.commands import COMMANDS, MENUS, Command, run
+from incpt.ui.commands import files
+from incpt.ui.commands.command import Action, Command
+from incpt.ui.commands.table import COMMANDS, MENUS
 from incpt.ui.editor.editor import Editor
 from incpt.ui.widgets import places
 
@@ -22,35 +23,37 @@ _KEY_NAMES = {"KeypadDecimal": "keypad_decimal"}
 _ANY_POPUP = imgui.PopupFlags_.any_popup
 
 
-def draw_menu_bar(editor: Editor) -> None:
-    """The bar at the top of the window."""
+def draw_menu_bar(editor: Editor) -> Action | None:
+    """The bar at the top of the window; returns what was chosen in it."""
     if not imgui.begin_main_menu_bar():
-        return
+        return None
+    chosen = None
     for menu in MENUS:
         is_open = imgui.begin_menu(menu)
         places.note(f"menu {menu}")
         if is_open:
-            _draw_entries(editor, menu)
+            chosen = _draw_entries(editor, menu) or chosen
             if menu == "File":
-                _draw_recent(editor)
+                chosen = _draw_recent(editor) or chosen
             imgui.end_menu()
     imgui.end_main_menu_bar()
+    return chosen
 
 
-def press_keys(editor: Editor) -> None:
-    """Run the command whose keys went down in this frame; not while a text is typed, a dialog is open or the
+def pressed_command(editor: Editor) -> Command | None:
+    """The command whose keys went down in this frame; none while a text is typed, a dialog is open or the
     camera flies, whose keys are letters."""
-    if imgui.get_io().want_text_input or editor.dialog is not None or editor.is_flying:
-        return
+    if imgui.get_io().want_text_input or editor.dialog is not None or editor.gesture.is_flying:
+        return None
     if imgui.is_key_pressed(imgui.Key.escape, False) and imgui.is_popup_open("", _ANY_POPUP):
         imgui.internal.close_popup_to_level(0, True)
-        return
+        return None
     navigation = editor.preferences.navigation
     for one in COMMANDS:
         keys = one.keys_in(navigation)
         if keys and imgui.is_key_chord_pressed(key_chord(keys)):
-            run(editor, one)
-            return
+            return one
+    return None
 
 
 @cache
@@ -63,19 +66,20 @@ def key_chord(keys: str) -> int:
     return chord
 
 
-def _draw_entries(editor: Editor, menu: str) -> None:
-    group = None
+def _draw_entries(editor: Editor, menu: str) -> Action | None:
+    group, chosen = None, None
     for place, commands in _by_place(menu):
         if group is not None and commands[0].group != group:
             imgui.separator()
         group = commands[0].group
         if place == menu:
-            _draw_commands(editor, commands)
+            chosen = _draw_commands(editor, commands) or chosen
         elif imgui.begin_menu(place.removeprefix(f"{menu}/")):
-            _draw_commands(editor, commands)
+            chosen = _draw_commands(editor, commands) or chosen
             imgui.end_menu()
         if place != menu:
             places.note(f"menu {place}")
+    return chosen
 
 
 def _by_place(menu: str) -> Iterator[tuple[str, list[Command]]]:
@@ -84,7 +88,8 @@ def _by_place(menu: str) -> Iterator[tuple[str, list[Command]]]:
         yield place, list(commands)
 
 
-def _draw_commands(editor: Editor, commands: list[Command]) -> None:
+def _draw_commands(editor: Editor, commands: list[Command]) -> Action | None:
+    chosen = None
     for one in commands:
         is_checked = one.checked is not None and one.checked(editor)
         keys = one.keys_in(editor.preferences.navigation)
@@ -95,14 +100,20 @@ def _draw_commands(editor: Editor, commands: list[Command]) -> None:
         if one.help and imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
             imgui.set_tooltip(one.help)
         if pressed:
-            run(editor, one)
+            chosen = one.action
+    return chosen
 
 
-def _draw_recent(editor: Editor) -> None:
+def _draw_recent(editor: Editor) -> Action | None:
     imgui.separator()
-    files = editor.preferences.recent_files
-    if imgui.begin_menu("Open recent", bool(files)):
-        for path in files:
+    files_there = editor.preferences.recent_files
+    chosen = None
+    is_open = imgui.begin_menu("Open recent", bool(files_there))
+    places.note("menu File/Open recent")
+    if is_open:
+        for path in files_there:
             if imgui.menu_item_simple(str(path)):
-                actions.open_file(editor, path)
+                chosen = path
+            places.note(f"recent {path.name}")
         imgui.end_menu()
+    return None if chosen is None else lambda editor: files.open_file(editor, chosen)

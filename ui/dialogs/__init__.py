@@ -1,1 +1,1 @@
-"""Dialogs: what stands over everything else until it is answered."""
+"""Dialogs: each is drawn until it is answered, and returns the answer; see `editor/dialog.py`."""

@@ -11,31 +11,16 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core import transform
-from incpt.scene.camera import Camera
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
-
-Rect = tuple[float, float, float, float]
-"""x, y, width, height in pixels of the framebuffer, from its top left corner."""
-PixelRect = tuple[int, int, int, int]
-
-FULL_SCREEN = """#version 330 core
-void main() {
-    vec2 corner = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
-    gl_Position = vec4(corner, 0.0, 1.0);
-}
-"""
-"""Vertex shader of one triangle that covers the viewport; draw 3 vertices of an empty array."""
-
-OVER = (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA, moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
-"""Blending of straight alpha that leaves an opaque framebuffer opaque."""
+from incpt.ui.display.projection import clip_from_world, covered, viewport_of
+from incpt.ui.display.shaders import FULL_SCREEN, OVER
+from incpt.ui.rect import Rect
 
 LINE_PX, RIM_PX = 2.0, 1.0
 """Width of the line and of the dark rim around it, at a DPI scale of 1."""
 ACTIVE, SELECTED, RIM = (1.0, 0.66, 0.22), (0.93, 0.42, 0.05), (0.06, 0.04, 0.02)
 
-_NEAR = 1e-4
 _BLOCK = 8
 _MOST_REACH = 12
 _TARGET_STEP = 64
@@ -141,64 +126,6 @@ class Outlined:
         return tuple(sorted(found, key=place))
 
 
-def inside(rect_px: Rect, clip_px: Rect | None, framebuffer_size: tuple[int, int] | None) -> PixelRect | None:
-    """The whole pixels that a rectangle touches inside others; None where there are none."""
-    if not (rect_px[2] > 0 and rect_px[3] > 0 and all(map(math.isfinite, rect_px))):
-        return None
-    x0, y0 = math.floor(rect_px[0]), math.floor(rect_px[1])
-    x1, y1 = math.ceil(rect_px[0] + rect_px[2]), math.ceil(rect_px[1] + rect_px[3])
-    bounds = [] if clip_px is None else [clip_px]
-    if framebuffer_size is not None:
-        bounds.append((0, 0, *framebuffer_size))
-    for x, y, width, height in bounds:
-        x0, y0 = max(x0, round(x)), max(y0, round(y))
-        x1, y1 = min(x1, round(x + width)), min(y1, round(y + height))
-    return (x0, y0, x1 - x0, y1 - y0) if x0 < x1 and y0 < y1 else None
-
-
-def viewport_of(part: PixelRect, framebuffer_height: int) -> PixelRect:
-    """The same rectangle counted from the bottom left, as OpenGL does."""
-    x, y, width, height = part
-    return x, framebuffer_height - y - height, width, height
-
-
-def clip_from_world(camera: Camera, aspect: float, rect_px: Rect, part: PixelRect) -> npt.NDArray[np.float64]:
-    """(4, 4) matrix that projects world space as the path tracer does, for an image that lies at `rect_px`
-    and a viewport that covers `part` of it. Depth only clips what lies behind the camera."""
-    right, up, forward = transform.camera_frame(
-        camera.position, camera.target, camera.up, camera.fov_y, aspect
-    )
-    rows = np.stack([right / (right @ right), up / (up @ up), forward])
-    view = np.column_stack([rows, -rows @ np.asarray(camera.position, np.float64)])
-    across, down, depth = view
-    x, y, width, height = rect_px
-    part_x, part_y, part_width, part_height = part
-    # Along an axis of the viewport: the image's own -1 to 1, scaled and moved to where the viewport sees it.
-    scale_x, scale_y = width / part_width, height / part_height
-    move_x = (2 * (x - part_x) + width) / part_width - 1
-    move_y = 1 - (2 * (y - part_y) + height) / part_height
-    near = depth - np.array([0, 0, 0, 2 * _NEAR])
-    return np.stack([scale_x * across + move_x * depth, scale_y * down + move_y * depth, near, depth])
-
-
-def covered(
-    objects: Sequence[Object], camera: Camera, aspect: float, rect_px: Rect, part: PixelRect, margin: int
-) -> PixelRect | None:
-    """The pixels of `part` that objects may cover, with a margin; None where there are none."""
-    frame = transform.camera_frame(camera.position, camera.target, camera.up, camera.fov_y, aspect)
-    corners = np.concatenate([transform.box_corners(o.world_bounds) for o in objects])
-    pixels, in_front = transform.project(corners, camera.position, frame, (1, 1))
-    if not in_front.all():
-        # What a box that reaches behind the camera covers is no box around its corners.
-        return part
-    low, high = pixels.min(axis=0), pixels.max(axis=0)
-    # Beyond this there is nothing to draw, and whole numbers of pixels would no longer be exact.
-    low, high = np.clip([low, high], -1e6, 1e6)
-    x, y = rect_px[0] + low[0] * rect_px[2] - margin, rect_px[1] + low[1] * rect_px[3] - margin
-    width, height = (high - low) * rect_px[2:] + 2 * margin
-    return inside((x, y, width, height), part, None)
-
-
 class Outline:
     """Draws the outline of objects. Keeps the triangles of each mesh on the GPU while it is outlined, and
     the lines until camera, rectangle or objects change."""
@@ -214,13 +141,13 @@ class Outline:
         self._meshes: dict[int, _MeshBuffers] = {}
         self._targets: _Targets | None = None
         self._drawn: tuple[object, ...] | None = None
-        self._box: PixelRect | None = None
+        self._box: Rect[int] | None = None
 
     def draw(
         self,
         target: moderngl.Framebuffer,
-        part: PixelRect,
-        rect_px: Rect,
+        part: Rect[int],
+        rect_px: Rect[float],
         framebuffer_height: int,
         selection: Outlined,
         aspect: float,
@@ -259,11 +186,11 @@ class Outline:
         for program in self._programs:
             program.release()
 
-    def mask(self) -> tuple[npt.NDArray[np.uint8], PixelRect]:
+    def mask(self) -> tuple[npt.NDArray[np.uint8], Rect[int]]:
         """The mask that was rasterised last, (h, w), row 0 on top, and where it lies: 0 where none of the
         objects is, 255 where the active one is, other numbers for the others."""
         assert self._targets is not None and self._box is not None, "nothing was drawn yet"
-        width, height = self._box[2:]
+        width, height = self._box.size
         pixels = self._targets.mask.read(viewport=(0, 0, width, height), components=1, alignment=1)
         return np.frombuffer(pixels, np.uint8).reshape(height, width)[::-1], self._box
 
@@ -285,8 +212,8 @@ class Outline:
         objects: Sequence[Object],
         selection: Outlined,
         aspect: float,
-        rect_px: Rect,
-        part: PixelRect,
+        rect_px: Rect[float],
+        part: Rect[int],
         scale: float,
     ) -> None:
         """Rasterises the objects into the mask and finds the lines around them."""
@@ -297,23 +224,25 @@ class Outline:
         if self._box is None:
             return
         self._context.enable_only(moderngl.NOTHING)
-        targets = self._make_targets(self._box[2:])
+        targets = self._make_targets(self._box.size)
         self._rasterise(objects, selection.active, clip_from_world(camera, aspect, rect_px, self._box))
         for program in (self._blocks, self._edge):
-            program["mask"], program["size"], program["reach"] = 0, self._box[2:], reach
+            program["mask"], program["size"], program["reach"] = 0, self._box.size, reach
         targets.mask_texture.use(0)
-        self._fill(targets.blocks, self._blocks, (-(-self._box[2] // _BLOCK), -(-self._box[3] // _BLOCK)))
+        self._fill(
+            targets.blocks, self._blocks, (-(-self._box.width // _BLOCK), -(-self._box.height // _BLOCK))
+        )
         edge = self._edge
         edge["blocks"], edge["line"], edge["rim"] = 1, line, rim
         edge["active_color"], edge["selected_color"], edge["rim_color"] = ACTIVE, SELECTED, RIM
         targets.blocks_texture.use(1)
-        self._fill(targets.lines, edge, self._box[2:])
+        self._fill(targets.lines, edge, self._box.size)
 
     def _rasterise(
         self, objects: Sequence[Object], active: str | None, clip: npt.NDArray[np.float64]
     ) -> None:
         assert self._targets is not None and self._box is not None
-        viewport = (0, 0, *self._box[2:])
+        viewport = (0, 0, *self._box.size)
         self._targets.mask.use()
         self._targets.mask.clear(viewport=viewport)
         self._context.viewport = viewport

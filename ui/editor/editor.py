@@ -10,40 +10,29 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from incpt.core.errors import DeviceError, InputError, OutputError, one_line
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
 from incpt.ui.display.overlays import NEEDS_AOVS
+from incpt.ui.editor.dialog import Answer, Dialog
 from incpt.ui.editor.document import Document
 from incpt.ui.editor.messages import Messages
+from incpt.ui.editor.state import Control, Gesture, Rendering, Screen, Tool
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
-from incpt.viewer.threaded import Building, Exported, Message, Picked, Problem, Renderer, Restart
+from incpt.viewer.threaded import Exported, Message, Pick, Picked, Problem, Renderer, Restart
 from incpt.viewer.viewer import Frame, View
 
-if TYPE_CHECKING:
-    from incpt.ui.dialogs.dialogs import Dialog
-    from incpt.ui.panels.render import Control
-
-ZOOM_REST_SECONDS = 0.4
-"""Turns of the wheel closer together than this are one entry of the history."""
 OpenRenderer = Callable[[str | None], Renderer]
+"""Opens a renderer on a device, given by name or None for the default."""
 
-
-@dataclass(frozen=True)
-class Tool:
-    """The gizmo: `operation` is move, rotate or scale; `space` is world or local."""
-
-    operation: str = "move"
-    space: str = "world"
+_REFUSALS = (InputError, OutputError, DeviceError)
 
 
 class Editor:
-    """Everything between the user and the renderer. `open_renderer` makes one for a device, given by name or
-    None for the default; `now` is a clock in seconds."""
+    """Everything between the user and the renderer. `now` is a clock in seconds."""
 
     def __init__(
         self,
@@ -53,30 +42,19 @@ class Editor:
         device: str | None = None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.document = document
-        self.device = device
+        self.now = now
         self._open_renderer = open_renderer
         self.renderer = open_renderer(device)
-        self.preferences = preferences
-        self.now = now
+        self.document = document
         self.selection = Selection()
+        self.preferences = preferences
         self.tool = Tool()
+        self.control = Control(device=device)
+        self.rendering = Rendering()
+        self.gesture = Gesture()
+        self.screen = Screen()
         self.messages = Messages(now)
         self.dialog: Dialog | None = None
-        self.frame: Frame | None = None
-        self.building: Building | None = None
-        self.paused = False
-        self.target_spp: int | None = None
-        self.is_pinned = False
-        self.point: tuple[float, float] | None = None
-        self.device_failed = False
-        self.viewport_size: tuple[int, int] | None = None
-        self.is_closing = False
-        self.asked_layout_reset = False
-        self.is_flying = False
-        self._hold_until = 0.0
-        self._is_held = False
-        self._has_cancelled = False
 
     # ---------------------------------------------------------------------------------- the scene
 
@@ -103,44 +81,63 @@ class Editor:
             scene, label, key, selection=self.selection.names, selection_after=after.within(scene).names
         )
         self.selection = after.within(scene)
-        self._hold_until = self.now() + rest_seconds
+        self.gesture = replace(self.gesture, rest_until=self.now() + rest_seconds)
 
     def attempt(self, action: Callable[[], object]) -> bool:
         """Run `action`; what it refuses becomes a message, and everything stays as it was."""
         try:
             action()
-        except (InputError, OutputError, DeviceError) as error:
+        except _REFUSALS as error:
             self.messages.add(one_line(str(error)), "error")
             return False
         return True
 
+    def answer(self, answer: Answer) -> None:
+        """Put the open dialog away and do what was chosen in it; see `Answer`."""
+        self.dialog = None
+        try:
+            following = answer.action()
+        except _REFUSALS as error:
+            reason = one_line(str(error))
+            if answer.explain is None:
+                self.messages.add(reason, "error")
+            else:
+                answer.explain(reason)
+            following = answer.again
+        if self.dialog is None:
+            self.dialog = following
+
     def undo(self) -> None:
         """Take back the last edit; a drag under way is given up."""
-        self._has_cancelled |= self.document.history.before is not None
+        self._end_drag()
         self._restore_selection(self.document.history.undo())
 
     def redo(self) -> None:
         """Do again what was taken back; a drag under way is ended."""
-        self._has_cancelled |= self.document.history.before is not None
+        self._end_drag()
         self._restore_selection(self.document.history.redo())
 
     def cancel(self) -> None:
         """Escape: give up the drag under way, else the selection."""
         if self.document.history.before is not None:
+            self._end_drag()
             self.document.history.cancel()
-            self._hold_until = 0.0
-            self._has_cancelled = True
+            self.gesture = replace(self.gesture, rest_until=0.0)
         elif self.selection:
             self.select(Selection())
-
-    def take_cancelled(self) -> bool:
-        """Whether a drag was given up since the last call: whoever holds it lets go."""
-        has_cancelled, self._has_cancelled = self._has_cancelled, False
-        return has_cancelled
 
     def select(self, selection: Selection) -> None:
         """Another selection; not an edit."""
         self.selection = selection.within(self.scene)
+
+    def pick(self, pick: Pick) -> None:
+        """Ask which object is at a point of the picture, to select it; an edit to come starts there."""
+        self.control = replace(self.control, point=pick.point)
+        self.renderer.request(pick)
+
+    def _end_drag(self) -> None:
+        if self.document.history.before is not None:
+            self.gesture = replace(self.gesture, is_cancelled=True)
 
     def _restore_selection(self, names: tuple[str, ...] | None) -> None:
         if names is not None:
@@ -149,21 +146,31 @@ class Editor:
     # ------------------------------------------------------------------------------- what is shown
 
     @property
+    def frame(self) -> Frame | None:
+        """The renderer's latest frame; None before the first."""
+        return self.rendering.frame
+
+    @property
     def view(self) -> View:
         """What the renderer is to show."""
         display = self.preferences.display
         return View(
             scene=self.scene,
             before=self.document.history.before,
-            point=self.point,
+            point=self.control.point,
             resolution_scale=self.preferences.resolution_scale,
-            paused=self.paused,
-            target_spp=self.target_spp,
+            paused=self.control.paused,
+            target_spp=self.control.target_spp,
             step_ms=self.preferences.step_ms,
             drag_nor=self.preferences.drag_nor,
             split=display.split,
             aovs=display.overlay in NEEDS_AOVS,
         )
+
+    def resize_viewport(self, size: tuple[int, int] | None) -> None:
+        """The panels leave so many pixels for the picture; None where that is too little for one."""
+        if size != self.screen.viewport_size:
+            self.screen = replace(self.screen, viewport_size=size)
 
     def change_display(self, display: DisplaySettings) -> None:
         """Show the picture otherwise; nothing is rendered anew."""
@@ -180,29 +187,18 @@ class Editor:
         if navigation != self.preferences.navigation:
             self.preferences = replace(self.preferences, navigation=navigation)
 
-    def steer(self, control: Control) -> None:
-        """Pause, aim and resolution of rendering. Raises InputError."""
-        self.paused, self.target_spp = control.paused, control.target_spp
-        changed = replace(
-            self.preferences,
-            resolution_scale=control.resolution_scale,
-            step_ms=control.step_ms,
-            drag_nor=control.drag_nor,
-        )
-        if changed != self.preferences:
-            self.preferences = changed
-
     def restart(self) -> None:
         """Render the picture from nothing; where the device failed, open it again first."""
-        if self.device_failed:
-            self.change_device(self.device)
+        if self.rendering.has_failed:
+            self.change_device(self.control.device)
         else:
             self.renderer.request(Restart())
 
     def change_device(self, device: str | None) -> None:
         """Render on another device from now on. The last picture stays until that one has one."""
         self.renderer.close()
-        self.device, self.device_failed, self.is_pinned = device, False, False
+        self.control = replace(self.control, device=device)
+        self.rendering = replace(self.rendering, is_pinned=False, has_failed=False)
         self.renderer = self._open_renderer(device)
         self.renderer.show(self.view)
 
@@ -212,26 +208,21 @@ class Editor:
         """Take the renderer's messages, and return them."""
         messages = self.renderer.poll()
         for message in messages:
+            self.rendering = self.rendering.after(message)
             match message:
-                case Frame():
-                    self.frame, self.building = message, None
-                    self.is_pinned = message.is_pinned
-                case Building():
-                    self.building = message if message.done < message.total else None
                 case Picked():
-                    self._picked(message)
+                    self.select(self.selection.clicked(message.name, message.additive))
                 case Exported():
                     self.messages.add(f"{message.path} is written", "done")
                 case Problem():
-                    self.device_failed |= message.fatal
                     self.messages.add(message.text, "error")
         return messages
 
-    def settle(self, is_held: bool) -> None:
+    def settle(self, is_held: bool, is_flying: bool = False) -> None:
         """End a frame; `is_held` tells whether a widget, the gizmo or the camera is being dragged."""
-        if not is_held and self.now() >= self._hold_until:
+        if not is_held and self.now() >= self.gesture.rest_until:
             self.document.history.settle()
-        self._is_held = is_held
+        self.gesture = Gesture(is_held, is_flying, self.gesture.rest_until)
         self.selection = self.selection.within(self.scene)
         self.renderer.show(self.view)
 
@@ -239,10 +230,8 @@ class Editor:
     def is_waiting(self) -> bool:
         """Whether a frame is due soon without an event: the camera flies, or an entry of the history waits
         for a rest."""
-        return self.is_flying or (self.document.history.before is not None and not self._is_held)
-
-    def _picked(self, picked: Picked) -> None:
-        self.select(self.selection.clicked(picked.name, picked.additive))
+        is_open = self.document.history.before is not None
+        return self.gesture.is_flying or (is_open and not self.gesture.is_held)
 
     # --------------------------------------------------------------------------------------- files
 
@@ -250,7 +239,7 @@ class Editor:
         """Edit another document from now on."""
         self.document = document
         self.select(Selection())
-        self.point = None
+        self.control = replace(self.control, point=None)
         for warning in document.warnings:
             self.messages.add(warning, "warning")
         if opened is not None:

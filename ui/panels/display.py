@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from incpt.ui.preferences import DisplaySettings
@@ -10,17 +9,27 @@ from incpt.ui.widgets import widgets
 from incpt.ui.widgets.widgets import Refusals
 
 CURVE_TEXTS = {"agx": "AgX", "filmic": "Filmic", "srgb": "sRGB, clipped"}
+"""How the panel names the curves of tone mapping."""
+OVERLAY_TEXTS = {
+    "none": "None",
+    "queue": "Order of the queue",
+    "replaced": "Replaced tiles",
+    "spp": "Samples per pixel",
+    "object_ids": "Object ids",
+    "normals": "Normals",
+    "albedo": "Albedo",
+    "depth": "Depth",
+}
+"""How panel and menu name the overlays, in the order of the menu."""
 
 
-def draw(
-    display: DisplaySettings, overlays: Sequence[tuple[str, str]], refusals: Refusals
-) -> DisplaySettings:
+def draw(display: DisplaySettings, refusals: Refusals) -> DisplaySettings:
     """Fields of the display settings; returns them after this frame."""
     exposure = widgets.number(
         "Exposure", display.exposure, low=-10.0, high=10.0, speed=0.02, unit=" EV", decimals=2
     )
     curve = widgets.choice("Curve", display.curve, list(CURVE_TEXTS.items()), "Tone mapping")
-    overlay = widgets.choice("Overlay", display.overlay, overlays, "Laid over the picture")
+    overlay = widgets.choice("Overlay", display.overlay, list(OVERLAY_TEXTS.items()), "Laid over the picture")
     opacity = display.overlay_opacity
     if overlay != "none":
         opacity = widgets.number("Opacity", opacity, low=0.0, high=1.0, speed=0.01, decimals=2)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from imgui_bundle import imgui
 
-from incpt.ui.editor.editor import Editor
+from incpt.scene.selection import Selection
+from incpt.ui.editor.messages import Message
 from incpt.ui.panels.render import MODE_TEXTS
+from incpt.ui.rect import Rect
 from incpt.ui.widgets import places, theme
-
-Rect = tuple[float, float, float, float]
+from incpt.viewer.viewer import Frame
 
 _COLORS = {"done": theme.QUIET, "warning": theme.WARNING, "error": theme.ERROR}
 _FLOATING = (
@@ -21,7 +24,7 @@ _FLOATING = (
 )
 
 
-def draw_status_bar(editor: Editor) -> None:
+def draw_status_bar(text: str) -> None:
     """One line at the bottom of the window."""
     flags = (
         imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.menu_bar
@@ -30,23 +33,23 @@ def draw_status_bar(editor: Editor) -> None:
     viewport = imgui.get_main_viewport()
     is_shown = imgui.internal.begin_viewport_side_bar("##status", viewport, imgui.Dir.down, height, flags)
     if is_shown and imgui.begin_menu_bar():
-        imgui.text_unformatted(status_text(editor))
+        imgui.text_unformatted(text)
         places.note("status")
         imgui.end_menu_bar()
     imgui.end()
 
 
-def status_text(editor: Editor) -> str:
+def status_text(frame: Frame | None, is_paused: bool, selection: Selection) -> str:
     """Mode, samples, selection: what one looks for without opening a panel."""
     parts = []
-    if editor.frame is not None:
-        picture = editor.frame.pictures[-1]
-        parts.append("Paused" if editor.paused else MODE_TEXTS[picture.mode])
+    if frame is not None:
+        picture = frame.pictures[-1]
+        parts.append("Paused" if is_paused else MODE_TEXTS[picture.mode])
         samples = int(picture.tile_spp.min())
         parts.append(f"{samples:,} {'sample' if samples == 1 else 'samples'} per pixel")
         if picture.error is not None:
             parts.append(f"RMSE {picture.error:.5f}")
-    names = editor.selection.names
+    names = selection.names
     if len(names) == 1:
         parts.append(names[0])
     elif names:
@@ -54,42 +57,38 @@ def status_text(editor: Editor) -> str:
     return "   |   ".join(parts)
 
 
-def draw_messages(editor: Editor, rect: Rect) -> None:
-    """Messages, at the top left of the picture, below one another."""
-    messages = editor.messages.current()
+def draw_messages(messages: Sequence[Message], picture: Rect[float]) -> Message | None:
+    """Messages, at the top left of the picture, below one another; returns the one that was dismissed."""
     if not messages:
-        return
+        return None
     line = imgui.get_text_line_height()
-    imgui.set_next_window_pos(imgui.ImVec2(rect[0] + line * 0.6, rect[1] + line * 0.6))
-    limit = imgui.ImVec2(max(rect[2] - 1.2 * line, 120.0), max(rect[3] - 1.2 * line, 60.0))
+    imgui.set_next_window_pos(imgui.ImVec2(picture.left + line * 0.6, picture.top + line * 0.6))
+    limit = imgui.ImVec2(max(picture.width - 1.2 * line, 120.0), max(picture.height - 1.2 * line, 60.0))
     imgui.set_next_window_size_constraints(imgui.ImVec2(0, 0), limit)
     imgui.set_next_window_bg_alpha(0.9)
+    dismissed = None
     if imgui.begin("##messages", None, _FLOATING)[0]:
-        imgui.push_text_wrap_pos(max(rect[2] - 6 * line, 100.0))
+        imgui.push_text_wrap_pos(max(picture.width - 6 * line, 100.0))
         for i, message in enumerate(messages):
             imgui.push_id(i)
             if imgui.small_button("×"):
-                editor.messages.dismiss(message)
+                dismissed = message
             places.note(f"dismiss {i}")
             imgui.same_line()
             imgui.text_colored(imgui.ImVec4(*_COLORS[message.level]), message.text)
             imgui.pop_id()
         imgui.pop_text_wrap_pos()
     imgui.end()
+    return dismissed
 
 
-def draw_building(editor: Editor, rect: Rect) -> None:
-    """A bar while kernels are compiled, in the middle of the picture."""
-    building = editor.building
-    if building is None or editor.device_failed:
-        return
-    imgui.set_next_window_pos(
-        imgui.ImVec2(rect[0] + rect[2] / 2, rect[1] + rect[3] / 2), imgui.Cond_.always, imgui.ImVec2(0.5, 0.5)
-    )
+def draw_building(done: int, total: int, picture: Rect[float]) -> None:
+    """A bar while kernels are compiled, in the middle of the picture: `done` of `total` steps are."""
+    pivot = imgui.ImVec2(0.5, 0.5)
+    imgui.set_next_window_pos(imgui.ImVec2(*picture.middle), imgui.Cond_.always, pivot)
     if imgui.begin("##building", None, _FLOATING)[0]:
         imgui.text_unformatted("Compiling the kernels for this device; they are kept for the next start")
         width = imgui.get_item_rect_size().x
-        share = building.done / max(building.total, 1)
-        imgui.progress_bar(share, imgui.ImVec2(width, 0), f"{building.done} of {building.total}")
+        imgui.progress_bar(done / max(total, 1), imgui.ImVec2(width, 0), f"{done} of {total}")
         places.note("building")
     imgui.end()

@@ -2,54 +2,11 @@
 
 from __future__ import annotations
 
-from collections import deque
-from dataclasses import dataclass, field
-
 import numpy as np
 from imgui_bundle import imgui, implot
 
+from incpt.ui.editor.records import Records, Series
 from incpt.ui.widgets import places
-from incpt.viewer.viewer import Frame
-
-_MOST_POINTS = 600
-
-
-@dataclass
-class Series:
-    """The last values of a quantity: y over x, both as they came."""
-
-    x: deque[float] = field(default_factory=lambda: deque(maxlen=_MOST_POINTS))
-    y: deque[float] = field(default_factory=lambda: deque(maxlen=_MOST_POINTS))
-
-    def add(self, x: float, y: float) -> None:
-        self.x.append(x)
-        self.y.append(y)
-
-
-class Records:
-    """What the frames told, for the plots: step times in milliseconds over seconds of the clock, and for
-    each strategy the error over its own rendering time since the last change."""
-
-    def __init__(self) -> None:
-        self.step_ms = Series()
-        self.errors: dict[str, Series] = {}
-        self._last: Frame | None = None
-
-    def add(self, frame: Frame, at: float) -> None:
-        """Take a frame that came at that time; the same frame twice counts once."""
-        if frame is self._last:
-            return
-        is_same_scene = self._last is not None and self._last.view.scene is frame.view.scene
-        if not is_same_scene or len(self.errors) != len(frame.pictures):
-            self.errors = {}
-        self._last = frame
-        self.step_ms.add(at, frame.step_seconds * 1e3)
-        for side, picture in enumerate(frame.pictures):
-            if picture.error is not None:
-                name = picture.strategy if side or len(frame.pictures) == 1 else "restart (left)"
-                series = self.errors.setdefault(name, Series())
-                if not series.x or series.x[-1] < picture.seconds:
-                    series.add(picture.seconds, picture.error)
 
 
 def draw(records: Records, step_ms: float) -> None:

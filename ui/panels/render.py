@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from imgui_bundle import imgui
 
 from incpt.core.settings import STRATEGIES, RenderSettings
 from incpt.render.modes import Mode
+from incpt.ui.editor.state import Control
+from incpt.ui.preferences import Preferences
 from incpt.ui.widgets import places, widgets
 from incpt.ui.widgets.widgets import Refusals
 from incpt.viewer.viewer import Frame, Picture
@@ -19,20 +21,11 @@ MODE_TEXTS = {
     Mode.REFINE: "Refine: more samples everywhere",
     Mode.INCREMENTAL: "Incremental: what the edit affects first",
 }
+"""What a mode is called where it is shown."""
 STRATEGY_TEXTS = {"restart": "Restart", "spiral": "Spiral"}
+"""What a strategy is called where it is chosen; one that is not here is called by its name."""
 _STRATEGY_TIP = "Restart: an edit starts everything anew. Spiral: from the edit outwards, the rest is kept"
 _TILE_SIZES = (8, 16, 32, 64, 128)
-
-
-@dataclass(frozen=True)
-class Control:
-    """What steers rendering and is no part of the scene. Numbers may be out of range."""
-
-    paused: bool
-    target_spp: int | None
-    resolution_scale: float
-    step_ms: float
-    drag_nor: int
 
 
 def draw_state(frame: Frame | None) -> None:
@@ -72,8 +65,10 @@ def draw_device(devices: Sequence[str], current: str) -> str | None:
     return chosen if chosen != current else None
 
 
-def draw_control(control: Control) -> tuple[Control, bool]:
-    """Pause, target, resolution; returns the control after this frame, and whether to restart."""
+def draw_control(
+    control: Control, preferences: Preferences, refusals: Refusals
+) -> tuple[Control, Preferences, bool]:
+    """Pause, target, resolution; returns both values after this frame, and whether to restart."""
     with widgets.row("Rendering"):
         paused = control.paused
         if widgets.button("Go on" if paused else "Pause"):
@@ -84,21 +79,27 @@ def draw_control(control: Control) -> tuple[Control, bool]:
         "Target spp", control.target_spp or 0, low=0, high=1 << 20, speed=1.0,
         tip="Rest when every pixel has that many samples; 0: never",
     )  # fmt: skip
-    percent = control.resolution_scale * 100
+    percent = preferences.resolution_scale * 100
     new_percent = widgets.number(
         "Resolution", percent, low=5.0, high=400.0, speed=1.0, unit=" %", decimals=0,
         tip="Of the scene's own size",
     )  # fmt: skip
     step_ms = widgets.number(
-        "Step time", control.step_ms, low=5.0, high=500.0, speed=0.5, unit=" ms", decimals=0,
+        "Step time", preferences.step_ms, low=5.0, high=500.0, speed=0.5, unit=" ms", decimals=0,
         tip="A rendering step aims at this time; shorter answers sooner, longer is more efficient",
     )  # fmt: skip
     drag_nor = widgets.whole_number(
-        "NoR in a drag", control.drag_nor, low=1, high=1 << 16,
+        "NoR in a drag", preferences.drag_nor, low=1, high=1 << 16,
         tip="Repetitions of a tile while something is dragged; the full NoR starts when it is let go",
     )  # fmt: skip
-    scale = control.resolution_scale if new_percent == percent else new_percent / 100
-    return Control(paused, target or None, scale, step_ms, drag_nor), is_restart
+    # A percentage that was not touched stays to the bit, which multiplying and dividing would round.
+    scale = preferences.resolution_scale if new_percent == percent else new_percent / 100
+    control = replace(control, paused=paused, target_spp=target or None)
+    preferences = refusals.accepted(
+        preferences,
+        lambda: replace(preferences, resolution_scale=scale, step_ms=step_ms, drag_nor=drag_nor),
+    )
+    return control, preferences, is_restart
 
 
 def draw_settings(settings: RenderSettings, refusals: Refusals) -> RenderSettings:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from incpt.ui.editor.editor import Tool
+from incpt.ui.editor.state import Tool
 from incpt.ui.preferences import RANGES, SnapSettings
 from incpt.ui.widgets import widgets
 from incpt.ui.widgets.widgets import Refusals
 
 OPERATIONS = (("move", "Move"), ("rotate", "Rotate"), ("scale", "Scale"))
+"""What the gizmo does, and how the panel names it."""
 SPACES = (("world", "World axes"), ("local", "The object's axes"))
+"""Along which axes, and how the panel names them."""
 
 
 def draw(tool: Tool, snap: SnapSettings, refusals: Refusals) -> tuple[Tool, SnapSettings]:

@@ -18,11 +18,12 @@ from incpt.core import transform
 from incpt.scene import edits
 from incpt.scene.camera import Camera
 from incpt.scene.model import Scene
+from incpt.ui.editor.state import Tool
 from incpt.ui.preferences import SnapSettings
+from incpt.ui.rect import Rect
 from incpt.ui.widgets import places
 
 Matrix = npt.NDArray[np.float64]
-Rect = tuple[float, float, float, float]
 
 _gizmo = imguizmo.im_guizmo
 _OPERATIONS = {
@@ -51,29 +52,31 @@ class Gizmo:
         self.is_over = False
 
     def draw(
-        self, scene: Scene, names: tuple[str, ...], operation: str, space: str, snap: SnapSettings, rect: Rect
+        self, scene: Scene, names: tuple[str, ...], tool: Tool, snap: SnapSettings, picture: Rect[float]
     ) -> Scene:
-        """Draw the handles over the picture in `rect` (left, top, width, height, points) and return the
-        scene after this frame."""
+        """Draw the handles over the picture, which lies at `picture` in points, and return the scene after
+        this frame."""
         _gizmo.begin_frame()
         visible = tuple(name for name in names if scene.object(name).visible)
         if not visible:
             self.is_using = self.is_over = False
             self._drag = None
             return scene
-        matrix = self._drag.matrix if self._drag is not None else pivot(scene, visible, space)
+        matrix = self._drag.matrix if self._drag is not None else pivot(scene, visible, tool.space)
         _gizmo.set_drawlist(imgui.get_background_draw_list())
-        _gizmo.set_rect(*rect)
+        _gizmo.set_rect(*picture)
         _gizmo.set_gizmo_size_clip_space(0.14)
-        view, projection = view_matrix(scene.camera), projection_matrix(scene.camera, rect[2] / rect[3])
+        view = view_matrix(scene.camera)
+        projection = projection_matrix(scene.camera, picture.width / picture.height)
         flat = _flat(matrix)
-        step = {"move": snap.move_m, "rotate": snap.rotate_deg, "scale": snap.scale}[operation]
+        is_local = tool.space == "local" or tool.operation == "scale"
+        step = {"move": snap.move_m, "rotate": snap.rotate_deg, "scale": snap.scale}[tool.operation]
         _gizmo.manipulate(
-            _flat(view), _flat(projection), _OPERATIONS[operation],
-            _gizmo.MODE.local if space == "local" or operation == "scale" else _gizmo.MODE.world,
+            _flat(view), _flat(projection), _OPERATIONS[tool.operation],
+            _gizmo.MODE.local if is_local else _gizmo.MODE.world,
             flat, None, _gizmo.Matrix3([step] * 3) if snap.enabled else None,
         )  # fmt: skip
-        _note_place(view, projection, matrix, rect)
+        _note_place(view, projection, matrix, picture)
         return self._follow(scene, visible, matrix, np.array(flat.values, np.float64).reshape(4, 4).T)
 
     def give_up(self) -> None:
@@ -136,9 +139,9 @@ def _flat(matrix: Matrix) -> imguizmo.im_guizmo.Matrix16:
     return _gizmo.Matrix16(matrix.T.ravel().tolist())
 
 
-def _note_place(view: Matrix, projection: Matrix, matrix: Matrix, rect: Rect) -> None:
+def _note_place(view: Matrix, projection: Matrix, matrix: Matrix, picture: Rect[float]) -> None:
     clip = projection @ view @ matrix[:, 3]
     if clip[3] > 0:
-        x = rect[0] + (clip[0] / clip[3] + 1) / 2 * rect[2]
-        y = rect[1] + (1 - clip[1] / clip[3]) / 2 * rect[3]
-        places.note_rect("gizmo", (x, y, x, y))
+        x = picture.left + (clip[0] / clip[3] + 1) / 2 * picture.width
+        y = picture.top + (1 - clip[1] / clip[3]) / 2 * picture.height
+        places.note_rect("gizmo", Rect(float(x), float(y), 0.0, 0.0))

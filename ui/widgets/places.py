@@ -5,11 +5,10 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-Rect = tuple[float, float, float, float]
-"""Left, top, right, bottom."""
+from incpt.ui.rect import Rect
 
-_drawing: dict[str, Rect] = {}
-_drawn: dict[str, Rect] = {}
+_drawing: dict[str, Rect[float]] = {}
+_drawn: dict[str, Rect[float]] = {}
 
 
 def begin_frame() -> None:
@@ -25,15 +24,15 @@ def note(name: str) -> None:
     left, top = max(low.x, clip.min.x), max(low.y, clip.min.y)
     right, bottom = min(high.x, clip.max.x), min(high.y, clip.max.y)
     if left < right and top < bottom:
-        _drawing[name] = (left, top, right, bottom)
+        _drawing[name] = Rect(left, top, right - left, bottom - top)
 
 
-def note_rect(name: str, rect: Rect) -> None:
+def note_rect(name: str, rect: Rect[float]) -> None:
     """Remember a place that is no widget of imgui."""
     _drawing[name] = rect
 
 
-def find(name: str) -> Rect | None:
+def find(name: str) -> Rect[float] | None:
     """The place of a widget in the frame before; None where it was not drawn."""
     return _drawn.get(name)
 

@@ -1,0 +1,43 @@
+"""What a command is: an action with a name, a place in the menus and keys."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from incpt.ui.editor.editor import Editor
+
+Action = Callable[[Editor], object]
+"""What a command does. What it refuses it raises; the editor shows it."""
+Test = Callable[[Editor], bool]
+
+
+@dataclass(frozen=True)
+class Command:
+    """`menu` may name a submenu after a slash; a line is drawn in menus where `group` changes. `keys` such
+    as "Ctrl+Shift+S"; `plain_keys` where the plain set differs. `checked` for what is on or off;
+    `detail` stands behind the name in menus: what would be undone."""
+
+    name: str
+    menu: str
+    action: Action
+    keys: str = ""
+    plain_keys: str | None = None
+    enabled: Test | None = None
+    checked: Test | None = None
+    detail: Callable[[Editor], str | None] | None = None
+    group: int = 0
+    help: str = ""
+
+    def keys_in(self, navigation: str) -> str:
+        """The keys in one of the two sets; empty where it has none."""
+        return self.plain_keys if navigation == "plain" and self.plain_keys is not None else self.keys
+
+    def is_enabled(self, editor: Editor) -> bool:
+        return self.enabled is None or self.enabled(editor)
+
+
+def run(editor: Editor, one: Command) -> None:
+    """Do what a command says, where it is enabled; what it refuses becomes a message."""
+    if one.is_enabled(editor):
+        editor.attempt(lambda: one.action(editor))

@@ -1,0 +1,159 @@
+"""Commands that open, save and import files, and that end the document under edit. Those that lose unsaved
+changes ask first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from incpt.formats import insert, mesh_files
+from incpt.scene.selection import Selection
+from incpt.ui.dialogs.native import FileKind
+from incpt.ui.dialogs.path_dialog import PathDialog
+from incpt.ui.dialogs.question import Choice, Question
+from incpt.ui.editor.dialog import Answer
+from incpt.ui.editor.document import Document, collected_warnings
+from incpt.ui.editor.editor import Editor
+from incpt.ui.editor.recovery import Recovery, find_left_behind
+
+SCENE_FILES: FileKind = ("Scenes", insert.SCENE_SUFFIXES)
+MESH_FILES: FileKind = ("Meshes", tuple(f".{name}" for name in mesh_files.mesh_suffixes()))
+ENVIRONMENTS: FileKind = ("Environments", insert.ENVIRONMENT_SUFFIXES)
+
+
+def new(editor: Editor) -> None:
+    """A new scene, once unsaved changes are cared for."""
+    _when_saved(editor, lambda: editor.start_over(Document.new()))
+
+
+def open_(editor: Editor) -> None:
+    """Ask for a scene file or a mesh and open it."""
+    everything = ("Scenes and meshes", SCENE_FILES[1] + MESH_FILES[1])
+    _when_saved(
+        editor, lambda: ask_path(editor, "Open", everything, False, lambda path: _open_now(editor, path))
+    )
+
+
+def open_file(editor: Editor, path: Path) -> None:
+    """Open that file, once unsaved changes are cared for."""
+    _when_saved(editor, lambda: _open_now(editor, path))
+
+
+def save(editor: Editor) -> None:
+    """Write the scene file; asks for a place where it has none."""
+    if editor.document.path is None:
+        save_as(editor)
+    else:
+        save_to(editor, editor.document.path)
+
+
+def save_as(editor: Editor, then: Callable[[], None] | None = None) -> None:
+    """Ask for a place and write the scene file there, then do what waits for it."""
+
+    def write(path: Path) -> None:
+        save_to(editor, path)
+        if then is not None:
+            then()
+
+    ask_path(editor, "Save as", SCENE_FILES, True, write, f"{stem(editor)}.toml")
+
+
+def save_to(editor: Editor, path: Path) -> None:
+    """Write the scene file there, and say so."""
+    written = editor.document.save(path)
+    editor.preferences = editor.preferences.with_recent(written)
+    editor.messages.add(f"{written} is saved", "done")
+
+
+def import_mesh(editor: Editor) -> None:
+    """Ask for a mesh file and add it to the scene."""
+    ask_path(editor, "Import mesh", MESH_FILES, False, lambda path: drop(editor, path))
+
+
+def choose_environment(editor: Editor) -> None:
+    """Ask for the image of the environment."""
+
+    def use(path: Path) -> None:
+        editor.propose(insert.set_environment_image(editor.scene, path), "Environment image")
+
+    ask_path(editor, "Environment image", ENVIRONMENTS, False, use)
+
+
+def drop(editor: Editor, path: Path) -> None:
+    """Take a file that was dropped on the window: open a scene, add a mesh, use an environment image."""
+    if insert.file_kind(path) is insert.FileKind.SCENE:
+        open_file(editor, path)
+        return
+    with collected_warnings() as warnings:
+        scene, names = insert.drop_file(editor.scene, path)
+    for warning in warnings:
+        editor.messages.add(warning, "warning")
+    selection = Selection(names) if names else editor.selection
+    editor.propose(scene, f"Add {path.name}", selection=selection)
+
+
+def quit_(editor: Editor) -> None:
+    """Close the window, once unsaved changes are cared for."""
+
+    def close() -> None:
+        editor.screen = replace(editor.screen, is_closing=True)
+
+    _when_saved(editor, close)
+
+
+def offer_recovery(editor: Editor, kept: Recovery) -> None:
+    """Ask what to do with the latest of what crashes left behind, where there is something."""
+    found = next(iter(find_left_behind()), None)
+    if found is None:
+        return
+    editor.dialog = Question(
+        "Recover",
+        f"The editor ended without saving {found.name}. Open what it had on {found.saved_at}?",
+        (
+            Choice("Recover", Answer(lambda: editor.start_over(kept.recover(found)))),
+            Choice("Discard", Answer(found.remove)),
+            Choice("Later", Answer()),
+        ),
+    )
+
+
+def ask_path(
+    editor: Editor,
+    title: str,
+    kind: FileKind,
+    is_saving: bool,
+    then: Callable[[Path], None],
+    name: str = "",
+) -> None:
+    """Ask for a file, and do something with it. `name` is a file to propose, in the document's own folder."""
+    start = editor.document.path.parent if editor.document.path is not None else Path.cwd()
+    editor.dialog = PathDialog(title, kind, is_saving, start, then, name)
+
+
+def stem(editor: Editor) -> str:
+    """The name of the document without its suffix: what a file beside it is called."""
+    return editor.document.name.removesuffix(".toml")
+
+
+def _open_now(editor: Editor, path: Path) -> None:
+    editor.start_over(Document.open(path), opened=path)
+
+
+def _when_saved(editor: Editor, then: Callable[[], None]) -> None:
+    """Do something that loses the document; first ask where it has changes that are not saved."""
+    if not editor.document.is_dirty:
+        then()
+        return
+
+    def save_first() -> None:
+        if editor.document.path is None:
+            save_as(editor, then)
+        elif editor.attempt(lambda: save(editor)):
+            then()
+
+    editor.dialog = Question(
+        "Unsaved changes",
+        f"{editor.document.name} has changes that are not saved.",
+        (Choice("Save", Answer(save_first)), Choice("Do not save", Answer(then)), Choice("Cancel", Answer())),
+    )

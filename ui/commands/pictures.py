@@ -1,0 +1,39 @@
+"""Commands that take the rendered picture out of the editor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from incpt.core.errors import InputError
+from incpt.picture import tone_mapping
+from incpt.ui.commands.files import ask_path, stem
+from incpt.ui.dialogs.native import FileKind
+from incpt.ui.editor import clipboard
+from incpt.ui.editor.editor import Editor
+from incpt.viewer.threaded import Export
+
+PICTURES: FileKind = ("Pictures", (".png", ".exr"))
+
+
+def export_picture(editor: Editor) -> None:
+    """Ask for a place and write the picture there."""
+    ask_path(
+        editor, "Export picture", PICTURES, True, lambda path: export_to(editor, path), f"{stem(editor)}.png"
+    )
+
+
+def export_to(editor: Editor, path: Path) -> None:
+    """Write the picture: PNG as it is shown, EXR linear with the AOVs."""
+    if path.suffix.lower() not in PICTURES[1]:
+        raise InputError(f"{path}: ends in no known format; use .exr or .png")
+    display = editor.preferences.display
+    editor.renderer.request(Export(path, aovs=True, exposure=display.exposure, curve=display.curve))
+
+
+def copy_picture(editor: Editor) -> None:
+    """Put the picture on the clipboard as it is shown."""
+    assert editor.frame is not None
+    display = editor.preferences.display
+    linear = editor.frame.pictures[-1].image[..., :3]
+    clipboard.copy_picture(tone_mapping.tone_map(linear, display.exposure, display.curve))
+    editor.messages.add("the picture is on the clipboard", "done")

@@ -1,0 +1,90 @@
+"""The values that the editor's state is made of, beside the document, the selection and the preferences."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from incpt.viewer.threaded import Building, Message, Problem
+from incpt.viewer.viewer import Frame
+
+
+@dataclass(frozen=True)
+class Tool:
+    """The gizmo: `operation` is move, rotate or scale; `space` is world or local."""
+
+    operation: str = "move"
+    space: str = "world"
+
+
+@dataclass(frozen=True)
+class Control:
+    """What is asked of the renderer, beside the scene, and is forgotten when the editor ends.
+
+    paused      nothing is rendered; edits wait.
+    target_spp  samples of every pixel at which rendering rests; None: it never rests.
+    point       where the picture was clicked last, in units of it from the top left; None: nowhere yet.
+    device      the OpenCL device by name; None: the default.
+    """
+
+    paused: bool = False
+    target_spp: int | None = None
+    point: tuple[float, float] | None = None
+    device: str | None = None
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """What the renderer has told so far.
+
+    frame       the latest frame; None before the first.
+    building    how far the kernels are built; None while none are.
+    is_pinned   whether errors are measured against a pinned picture.
+    has_failed  whether the device does nothing more until it is opened again.
+    """
+
+    frame: Frame | None = None
+    building: Building | None = None
+    is_pinned: bool = False
+    has_failed: bool = False
+
+    def after(self, message: Message) -> Rendering:
+        """What is known after one more message."""
+        match message:
+            case Frame():
+                return replace(self, frame=message, building=None, is_pinned=message.is_pinned)
+            case Building():
+                return replace(self, building=message if message.done < message.total else None)
+            case Problem():
+                return replace(self, has_failed=self.has_failed or message.fatal)
+        return self
+
+
+@dataclass(frozen=True)
+class Gesture:
+    """What the user's hand is doing, from one frame to the next.
+
+    is_held        a widget, the gizmo or the camera is being dragged.
+    is_flying      the camera flies: frames are due without an event, and letters are no commands.
+    rest_until     the entry of the history stays open until then, in seconds of the editor's clock.
+    is_cancelled   a drag was given up in this frame: whoever holds it lets go.
+    """
+
+    is_held: bool = False
+    is_flying: bool = False
+    rest_until: float = 0.0
+    is_cancelled: bool = False
+
+
+@dataclass(frozen=True)
+class Screen:
+    """What the editor and the window around it have to tell each other.
+
+    viewport_size        pixels that the panels leave for the picture; None before the first frame, and where
+                         there is no room for one.
+    is_closing           the window is to close.
+    wants_first_layout   the panels are to stand again as at the first start.
+    """
+
+    viewport_size: tuple[int, int] | None = None
+    is_closing: bool = False
+    wants_first_layout: bool = False

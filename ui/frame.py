@@ -1,0 +1,67 @@
+"""One frame of the editor: what is drawn, and what becomes of the user's hand."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from incpt.ui.display.display import Display
+from incpt.ui.display.outline import Outlined
+from incpt.ui.display.overlays import Overlay
+from incpt.ui.editor.editor import Editor
+from incpt.ui.rect import Rect
+from incpt.ui.viewport import captions
+from incpt.ui.viewport.viewport import Outcome, Viewport, picture_rect, pixels_in
+from incpt.ui.workspace import Workspace
+
+
+def take_frame(
+    editor: Editor, workspace: Workspace, viewport: Viewport, overlay: Overlay | None = None
+) -> Rect[float]:
+    """The part of a frame between imgui's begin and end: draw all but the picture, and take the edits.
+    `overlay` is what lies over the picture. Returns what the panels leave for the picture, in points."""
+    area = workspace.draw(editor)
+    picture = picture_rect(area, editor.scene.settings.size)
+    editor.resize_viewport(pixels_in(area))
+    if editor.gesture.is_cancelled:
+        viewport.let_go()
+    outcome = viewport.update(
+        editor.scene,
+        editor.selection,
+        editor.tool,
+        editor.preferences,
+        picture,
+        is_blocked=editor.dialog is not None,
+    )
+    _take_outcome(editor, outcome)
+    captions.draw(editor.frame, overlay, editor.preferences.display, picture)
+    editor.settle(viewport.is_held or imgui.is_any_item_active(), viewport.is_flying)
+    return area
+
+
+def draw_picture(
+    editor: Editor, display: Display, area: Rect[float], framebuffer_size: tuple[int, int], scale: float
+) -> None:
+    """Draw the picture into the framebuffer that is bound, below the panels. `area` is what they leave for
+    it, in points; `scale` is framebuffer pixels per point."""
+    selection = None
+    if editor.selection:
+        names = frozenset(editor.selection.names)
+        selection = Outlined(editor.scene, names, editor.selection.active)
+    display.draw(
+        picture_rect(area, editor.scene.settings.size).scaled(scale),
+        editor.preferences.display,
+        framebuffer_size=framebuffer_size,
+        clip_px=area.scaled(scale),
+        selection=selection,
+        scale=scale,
+    )
+
+
+def _take_outcome(editor: Editor, outcome: Outcome) -> None:
+    for one in outcome.proposals:
+        editor.propose(one.scene, one.label, one.key, rest_seconds=one.rest_seconds)
+    if outcome.selection != editor.selection:
+        editor.select(outcome.selection)
+    editor.change_display(outcome.display)
+    if outcome.pick is not None:
+        editor.pick(outcome.pick)
