@@ -73,7 +73,7 @@ class App:
         is_due = self.window.wait(wait)
         if received := editor.receive():
             is_due = True
-            # A picture moves no widget: one frame shows it.
+            # A picture moves no widget, so one frame is enough to show it.
             if not all(isinstance(message, Frame) for message in received):
                 self.window.redraw()
         if is_due or editor.is_waiting or self._has_message_ended():
@@ -110,7 +110,7 @@ class App:
     def read_pixels(self) -> npt.NDArray[np.uint8]:
         """(H, W, 3) the frame drawn last, row 0 on top."""
         width, height = self.window.framebuffer_size
-        # A frame of its own: after the buffers were swapped the back buffer holds nothing that is defined.
+        # It draws a frame of its own, because what the back buffer holds is undefined after a swap.
         self.frame(is_swapped=False)
         flat = np.frombuffer(self.window.context.screen.read(components=3, alignment=1), np.uint8)
         return flat.reshape(height, width, 3)[::-1]

@@ -17,6 +17,7 @@ CLICK_PX = 4.0
 """Movement from which on a press is a drag, pixels of the screen at a scale of 1."""
 
 SHIFT, CTRL, ALT = "shift", "ctrl", "alt"
+"""The modifier keys, as `Binding.modifiers` names them."""
 
 
 class Action(Enum):
@@ -76,10 +77,11 @@ CLICKS = (
 """In both sets."""
 
 _WHEEL = _binding("wheel", Action.ZOOM, "Zoom towards the cursor")
+"""What the wheel does in both sets."""
 
 NAVIGATION: dict[str, tuple[Binding, ...]] = {
-    # Alt with the left button stands in for a middle button that a touchpad has not: Blender's "Emulate 3
-    # Button Mouse".
+    # A touchpad has no middle button: Alt with the left button stands in for it, as Blender's "Emulate 3
+    # Button Mouse" has it.
     "blender": (
         _binding("middle", Action.ORBIT, "Orbit around the target"),
         _binding("shift+middle", Action.PAN, "Pan"),
@@ -90,8 +92,8 @@ NAVIGATION: dict[str, tuple[Binding, ...]] = {
         _binding("alt+ctrl+left", Action.DOLLY, "Move nearer or farther, without a middle button"),
         _binding("shift+`", Action.FLY, "Fly until a click or Escape"),
     ),
-    # Maya's three with Alt, and the bare buttons of viewers such as Sketchfab and Unreal: many desktops
-    # keep Alt + left drag for themselves.
+    # These are Maya's three moves with Alt, and the bare buttons of viewers such as Sketchfab and Unreal,
+    # because many desktops keep Alt + left drag for themselves.
     "plain": (
         _binding("left", Action.ORBIT, "Orbit around the target"),
         _binding("middle", Action.PAN, "Pan"),
@@ -125,6 +127,7 @@ FLY_KEYS = (
     FlyKey("e", 0, 0, 1, "Fly up"),
     FlyKey("q", 0, 0, -1, "Fly down"),
 )
+"""The keys that fly, in both sets."""
 FLY_FAST = 4.0
 """Of the speed while Shift is held."""
 

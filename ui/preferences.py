@@ -23,10 +23,14 @@ from incpt.core.errors import InputError, OutputError, one_line
 CONFIG_DIR = "INCPT_CONFIG_DIR"
 """Environment variable: the folder for everything the editor keeps, in place of the user's own."""
 MAX_RECENT = 10
+"""How many recent files are remembered."""
 
 CURVES = ("agx", "filmic", "srgb")
+"""Curves of tone mapping, by name."""
 OVERLAYS = ("none", "queue", "replaced", "spp", "object_ids", "normals", "albedo", "depth")
+"""What may be laid over the picture, in the order of the menu."""
 NAVIGATIONS = ("blender", "plain")
+"""Sets of keys and moves of the mouse; see `bindings`."""
 CHOICES: Mapping[str, tuple[str, ...]] = {"curve": CURVES, "overlay": OVERLAYS, "navigation": NAVIGATIONS}
 """The values that a text may have, by name of the field."""
 RANGES: Mapping[str, tuple[float, float]] = {

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from imgui_bundle import imgui  # before glfw, whose library it brings
+from imgui_bundle import imgui  # It comes before glfw, because it brings the library that glfw loads.
 
 import glfw  # isort: skip
 import moderngl
@@ -18,6 +18,7 @@ from incpt.core.errors import DeviceError
 from incpt.ui.widgets import theme
 
 _GLSL = "#version 330"
+"""The version of GLSL that imgui's renderer is to use."""
 _SETTLING_FRAMES = 3
 """Frames that imgui needs after an event until hover and layout are at rest."""
 _TOOLTIP_SECONDS = 0.5
@@ -33,7 +34,7 @@ class Window:
             (glfw.CONTEXT_VERSION_MAJOR, 3),
             (glfw.CONTEXT_VERSION_MINOR, 3),
             (glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE),
-            (glfw.OPENGL_FORWARD_COMPAT, True),  # macOS gives no core profile without it
+            (glfw.OPENGL_FORWARD_COMPAT, True),  # Without it macOS gives no core profile.
             (glfw.SCALE_TO_MONITOR, True),
         ):
             glfw.window_hint(hint, value)
@@ -54,7 +55,7 @@ class Window:
         self._start_imgui(layout_file)
 
     def _listen(self) -> None:
-        # Before imgui's backend, which calls the callbacks that it finds.
+        # This comes before imgui's backend starts, which goes on calling the callbacks that it finds.
         for listen in (
             glfw.set_cursor_pos_callback,
             glfw.set_mouse_button_callback,
@@ -166,7 +167,8 @@ class Window:
         glfw.terminate()
 
     def _follow_scale(self) -> None:
-        # On macOS a point of the window is a point already; elsewhere the content scale tells.
+        # On macOS the system's screen coordinates are points already; elsewhere the content scale tells how
+        # many pixels a point has.
         content = glfw.get_window_content_scale(self.handle)[0]
         points = self.framebuffer_size[0] / max(self.size[0], 1)
         scale = self._fixed_scale or content / max(points, 1.0)

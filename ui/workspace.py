@@ -1,4 +1,4 @@
-"""Where the panels stand, and how what they return becomes edits: the one place that joins the two."""
+"""The panels of the editor, and how what they return becomes edits: the one place that joins the two."""
 
 from __future__ import annotations
 
@@ -13,16 +13,15 @@ from incpt.scene.model import Object, Scene
 from incpt.ui.commands import camera, command, files, materials, menus, objects, rendering
 from incpt.ui.editor.editor import Editor
 from incpt.ui.editor.records import Records
+from incpt.ui.layout import Layout
+from incpt.ui.panels import camera as camera_panel
 from incpt.ui.panels import display as display_panel
+from incpt.ui.panels import environment as environment_panel
 from incpt.ui.panels import material as material_panel
-from incpt.ui.panels import notices, outliner, plots, render, scene_panel, tool, transform
+from incpt.ui.panels import notices, outliner, plots, render, tool, transform
 from incpt.ui.rect import Rect
 from incpt.ui.widgets import places, widgets
-from incpt.ui.widgets.widgets import Refusals
-
-_RIGHT_SHARE, _OUTLINER_SHARE = 0.25, 0.28
-_LEAST_WIDTH = 310.0
-"""Of the panels on the right, in points: all tabs are to be seen."""
+from incpt.ui.widgets.refusals import Refusals
 
 
 class Workspace:
@@ -33,8 +32,7 @@ class Workspace:
         self._search = ""
         self._is_uniform = True
         self._devices: list[str] | None = None
-        self._is_laid_out = False
-        self._shows_first_tab = False
+        self._layout = Layout()
 
     def draw(self, editor: Editor) -> Rect[float]:
         """Draw menus, panels and dialogs, and take what they return; returns the rectangle that is left for
@@ -44,33 +42,20 @@ class Workspace:
         if chosen is not None:
             editor.attempt(lambda: chosen(editor))
         notices.draw_status_bar(notices.status_text(editor.frame, editor.control.paused, editor.selection))
-        rect = self._dock(editor)
+        area = self._layout.dock(editor.screen.wants_first_layout)
+        editor.screen = replace(editor.screen, wants_first_layout=False)
         self._window("Outliner", editor, self._draw_outliner)
         self._window("Object", editor, self._draw_object)
         self._window("Scene", editor, self._draw_scene)
         self._window("Render", editor, self._draw_render)
         self._window("Method", editor, self._draw_method)
-        if self._shows_first_tab:
-            imgui.set_window_focus("Object")
-            self._shows_first_tab = False
-        _draw_notices(editor, rect)
+        self._layout.show_first_tab()
+        _draw_notices(editor, area)
         _draw_dialog(editor)
         pressed = menus.pressed_command(editor)
         if pressed is not None:
             command.run(editor, pressed)
-        return rect
-
-    def _dock(self, editor: Editor) -> Rect[float]:
-        root = imgui.get_id("incpt workspace")
-        is_known = imgui.internal.dock_builder_get_node(root) is not None
-        if editor.screen.wants_first_layout or not (self._is_laid_out or is_known):
-            _lay_out(root)
-            editor.screen = replace(editor.screen, wants_first_layout=False)
-            self._shows_first_tab = True
-        self._is_laid_out = True
-        imgui.dock_space_over_viewport(root, None, imgui.DockNodeFlags_.passthru_central_node)
-        node = imgui.internal.dock_builder_get_central_node(root)
-        return Rect(node.pos.x, node.pos.y, node.size.x, node.size.y)
+        return area
 
     def _window(self, name: str, editor: Editor, draw: Callable[[Editor], None]) -> None:
         if imgui.begin(name, None, imgui.WindowFlags_.no_collapse)[0]:
@@ -135,7 +120,7 @@ class Workspace:
         scene = editor.scene
         with widgets.section("Camera") as is_open:
             if is_open:
-                new = scene_panel.draw_camera(scene.camera, refusals)
+                new = camera_panel.draw(scene.camera, refusals)
                 if new is not scene.camera:
                     editor.propose(replace(scene, camera=new), "Camera", _key())
                 if widgets.button("Frame selected##camera"):
@@ -146,7 +131,7 @@ class Workspace:
         scene = editor.scene
         with widgets.section("Environment") as is_open:
             if is_open:
-                environment, asked = scene_panel.draw_environment(scene.environment, refusals)
+                environment, asked = environment_panel.draw(scene.environment, refusals)
                 if environment is not scene.environment:
                     editor.propose(replace(scene, environment=environment), "Environment", _key())
                 if asked.is_choose:
@@ -199,34 +184,19 @@ class Workspace:
                 plots.draw(self.records, editor.preferences.step_ms)
 
 
-def _draw_notices(editor: Editor, rect: Rect[float]) -> None:
-    dismissed = notices.draw_messages(editor.messages.current(), rect)
+def _draw_notices(editor: Editor, area: Rect[float]) -> None:
+    dismissed = notices.draw_messages(editor.messages.current(), area)
     if dismissed is not None:
         editor.messages.dismiss(dismissed)
     building = editor.rendering.building
     if building is not None and not editor.rendering.has_failed:
-        notices.draw_building(building.done, building.total, rect)
+        notices.draw_building(building.done, building.total, area)
 
 
 def _draw_dialog(editor: Editor) -> None:
     answer = editor.dialog.draw() if editor.dialog is not None else None
     if answer is not None:
         editor.answer(answer)
-
-
-def _lay_out(root: int) -> None:
-    builder = imgui.internal
-    builder.dock_builder_remove_node(root)
-    builder.dock_builder_add_node(root, builder.DockNodeFlagsPrivate_.dock_space)
-    builder.dock_builder_set_node_size(root, imgui.get_main_viewport().work_size)
-    least = _LEAST_WIDTH * imgui.get_style().font_scale_dpi / imgui.get_main_viewport().work_size.x
-    share = min(max(_RIGHT_SHARE, least), 0.5)
-    _, right, _ = builder.dock_builder_split_node_py(root, imgui.Dir.right, share)
-    _, top, bottom = builder.dock_builder_split_node_py(right, imgui.Dir.up, _OUTLINER_SHARE)
-    builder.dock_builder_dock_window("Outliner", top)
-    for name in ("Object", "Scene", "Render", "Method"):
-        builder.dock_builder_dock_window(name, bottom)
-    builder.dock_builder_finish(root)
 
 
 def _key() -> str:
@@ -236,7 +206,7 @@ def _key() -> str:
 
 
 def _tell(editor: Editor, refusals: Refusals) -> None:
-    # Not in the panel: a field refuses in one frame only, and the panel may be scrolled.
+    # A refusal is no line in the panel: it lasts for one frame only, and the panel may be scrolled.
     for message in refusals.messages:
         editor.messages.add(message, "warning")
 

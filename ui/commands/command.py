@@ -10,6 +10,7 @@ from incpt.ui.editor.editor import Editor
 Action = Callable[[Editor], object]
 """What a command does. What it refuses it raises; the editor shows it."""
 Test = Callable[[Editor], bool]
+"""Tells something about a command in the state that the editor is in."""
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,11 @@ from incpt.ui.editor.editor import Editor
 from incpt.ui.editor.recovery import Recovery, find_left_behind
 
 SCENE_FILES: FileKind = ("Scenes", insert.SCENE_SUFFIXES)
+"""Files that hold a whole scene."""
 MESH_FILES: FileKind = ("Meshes", tuple(f".{name}" for name in mesh_files.mesh_suffixes()))
+"""Files that hold a mesh."""
 ENVIRONMENTS: FileKind = ("Environments", insert.ENVIRONMENT_SUFFIXES)
+"""Images that may surround the scene."""
 
 
 def new(editor: Editor) -> None:

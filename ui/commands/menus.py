@@ -19,7 +19,9 @@ _MODIFIERS = {
     "Shift": imgui.Key.mod_shift,
     "Alt": imgui.Key.mod_alt,
 }
+"""imgui's modifiers, by their names in the table of commands."""
 _KEY_NAMES = {"KeypadDecimal": "keypad_decimal"}
+"""imgui's names of keys, where they are not those of the table in lower case."""
 _ANY_POPUP = imgui.PopupFlags_.any_popup
 
 

@@ -13,6 +13,7 @@ from incpt.ui.editor.editor import Editor
 from incpt.viewer.threaded import Export
 
 PICTURES: FileKind = ("Pictures", (".png", ".exr"))
+"""Files that the picture can be written to."""
 
 
 def export_picture(editor: Editor) -> None:

@@ -18,6 +18,7 @@ Line = tuple[str, str]
 NAVIGATION_TEXTS = {"blender": "Blender-like", "plain": "Plain"}
 """How the page names the sets of bindings."""
 _WIDTH = 660.0
+"""Width of the dialog, in points at a scale of 1."""
 _HEIGHT_SHARE = 0.6
 """Height of the tables as a share of the window's."""
 

@@ -17,7 +17,7 @@ FileKind = tuple[str, tuple[str, ...]]
 
 def is_there() -> bool:
     """Whether the system has such a dialog."""
-    # On Linux portable-file-dialogs runs one of these programs, and waits for ever where there is none.
+    # On Linux portable-file-dialogs runs one of these programs, and waits forever where there is none.
     return not sys.platform.startswith("linux") or any(map(shutil.which, _PROGRAMS))
 
 

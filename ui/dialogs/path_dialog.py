@@ -118,6 +118,6 @@ def _entries(folder: Path, suffixes: tuple[str, ...]) -> list[str]:
     except OSError:
         return []
     seen = [path for path in found if not path.name.startswith(".")]
-    # os.path, because Path.is_dir raises where a folder may be listed and not entered.
+    # Path.is_dir raises where a folder may be listed and not entered; os.path.isdir does not.
     folders = [f"{path.name}/" for path in seen if os.path.isdir(path)]
     return folders + [path.name for path in seen if path.suffix.lower() in suffixes and os.path.isfile(path)]

@@ -64,10 +64,6 @@ class Display:
         self.upload(())
         self._aovs = None
 
-    @property
-    def has_picture(self) -> bool:
-        return bool(self._sides)
-
     def overlay(self, side: int = -1) -> Overlay | None:
         """The overlay of a side as it was drawn last, for its legend and numbers; see `overlays.Overlay`."""
         return self._sides[side].overlay if self._sides else None

@@ -20,24 +20,31 @@ from incpt.ui.rect import Rect
 LINE_PX, RIM_PX = 2.0, 1.0
 """Width of the line and of the dark rim around it, at a DPI scale of 1."""
 ACTIVE, SELECTED, RIM = (1.0, 0.66, 0.22), (0.93, 0.42, 0.05), (0.06, 0.04, 0.02)
+"""Colours of the line around the active object and around the others, and of the rim: sRGB, 0 to 1."""
 
 _BLOCK = 8
+"""Width and height of a block of pixels that is looked at as one, where there is no edge near."""
 _MOST_REACH = 12
+"""The farthest that the search for an edge goes, in pixels."""
 _TARGET_STEP = 64
+"""Width and height of render targets are whole multiples of this, in pixels."""
 
 _FLAT_VERTEX = """#version 330 core
 uniform mat4 clip_from_object;
 in vec3 position;
 void main() { gl_Position = clip_from_object * vec4(position, 1.0); }
 """
+"""Vertex shader of the mask."""
 
 _FLAT_FRAGMENT = """#version 330 core
 uniform float number;
 out float mask;
 void main() { mask = number; }
 """
+"""Fragment shader of the mask: each object writes its number, 0 to 1."""
 
-# The least and the greatest number in and around each block: where they are equal there is no edge near.
+# The result is the least and the greatest number in and around each block. Where they are equal, no edge is
+# near, and the shader that looks for edges has nothing to do.
 _BLOCKS = f"""#version 330 core
 uniform sampler2D mask;
 uniform ivec2 size;
@@ -55,7 +62,8 @@ void main() {{
 }}
 """
 
-# A line outside of each object, around all that has a smaller number; soft by half a pixel on either side.
+# The result is a line around each object: it lies on pixels whose own number is smaller than the object's,
+# and is soft by half a pixel on either side.
 _EDGE = f"""#version 330 core
 uniform sampler2D mask;
 uniform sampler2D blocks;
@@ -102,6 +110,7 @@ uniform ivec2 origin;
 out vec4 result;
 void main() { result = texelFetch(lines, ivec2(gl_FragCoord.xy) - origin, 0); }
 """
+"""Fragment shader that lays the finished lines over the picture."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +128,7 @@ class Outlined:
         found = [o for o in self.scene.objects if o.name in self.names and o.visible]
 
         def place(obj: Object) -> tuple[bool, float]:
-            # By the farthest corner, so that a floor comes before what stands on it.
+            # The farthest corner decides, so that a floor comes before what stands on it.
             ways = np.abs(obj.world_bounds - self.scene.camera.position).max(axis=0)
             return obj.name == self.active, -float(np.linalg.norm(ways))
 
@@ -251,7 +260,8 @@ class Outline:
             self._flat["clip_from_object"] = tuple((clip @ world).T.ravel())
             self._flat["number"] = 1.0 if obj.name == active else (1 + number % 254) / 255
             buffers = self._meshes[id(obj.mesh)]
-            # Where a surface is closed, what faces away covers the same pixels, in half the time.
+            # Of a closed surface the faces that look away cover the same pixels as all faces do, in half the
+            # time.
             is_mirrored = bool(np.linalg.det(obj.world_from_object[:, :3]) < 0)
             self._context.front_face = "cw" if is_mirrored else "ccw"
             self._context.cull_face = "front"
@@ -294,7 +304,7 @@ def is_closed(mesh: Mesh) -> bool:
 
 class _MeshBuffers:
     def __init__(self, context: moderngl.Context, program: moderngl.Program, mesh: Mesh) -> None:
-        self.mesh = mesh  # holds on to it, so that its id stays its own
+        self.mesh = mesh  # While it is held, no other mesh can have its id, by which it is found.
         self.is_closed = is_closed(mesh)
         self._vertices = context.buffer(mesh.vertices.tobytes())
         self._faces = context.buffer(mesh.faces.tobytes())

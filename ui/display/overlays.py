@@ -5,37 +5,43 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-if TYPE_CHECKING:
-    from incpt.render.first_hits import Aovs
-    from incpt.viewer.viewer import Picture
+from incpt.render.first_hits import Aovs
+from incpt.viewer.viewer import Picture
 
 Pixels = npt.NDArray[np.uint8]
+"""(h, w, 3) or (h, w, 4), sRGB, row 0 on top."""
 Color = tuple[int, int, int]
+"""sRGB, 0 to 255."""
 
 NEEDS_AOVS = frozenset({"object_ids", "normals", "albedo", "depth"})
 """Overlays that want first-hit images: a View with `aovs`."""
 
 _DONE_ALPHA, _WAITING_ALPHA = 90, 255
+"""Opacity of tiles that the queue has passed and of those that wait, 0 to 255."""
 _REPLACED = (70, 200, 140, 150)
+"""Colour of a replaced tile, sRGB with alpha."""
 _LEAST_SPP_RANGE = 4.0
+"""The scale of samples per pixel spans at least this factor."""
 _DEPTH_PERCENTILES = (1.0, 99.0)
+"""The scale of depth runs between these percentiles of the depths that were hit."""
 _GOLDEN_TURN = math.tau * 0.6180339887498949
+"""A golden section of a full turn, in radians."""
 
 
 def _table(text: str) -> npt.NDArray[np.float64]:
     return np.array([[int(word[i : i + 2], 16) for i in (0, 2, 4)] for word in text.split()], np.float64)
 
 
-# Colours at equal distances of the maps by S. van der Walt and N. Smith (matplotlib, 2015; CC0). Between
-# them, straight lines stay within 4 of 255 of the maps themselves.
 VIRIDIS = _table("440154 472d7b 3b528b 2c728e 21918c 28ae80 5ec962 addc30 fde725")
-# Inferno without its first quarter, which is so dark that nothing would be seen beneath.
+"""(9, 3) colours at equal distances of the map of that name, by S. van der Walt and N. Smith (matplotlib,
+2015; CC0). Straight lines between them stay within 4 of 255 of the map itself."""
 HEAT = _table("57106e 8a226a bc3754 e45a31 f98e09 f9cb35 fcffa4")
+"""(7, 3) colours of Inferno, by the same authors, without its first quarter, which is so dark that nothing
+would be seen beneath."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +118,7 @@ def _spp(picture: Picture) -> Overlay:
     spp = np.asarray(picture.tile_spp, np.float64)
     some = spp > 0
     high = max(float(spp.max(initial=1.0)), 1.0)
-    # Without a least range, 255 beside 256 samples would look like night and day.
+    # Without this range 255 samples beside 256 would have the two ends of the scale.
     low = max(min(float(spp[some].min(initial=high)), high / _LEAST_SPP_RANGE), 1.0)
     image = np.full((len(spp), 4), 255, np.uint8)
     image[:, :3] = color_map(HEAT, _log_place(np.maximum(spp, low), low, high))
@@ -167,6 +173,7 @@ def _depth(aovs: Aovs) -> tuple[Pixels, tuple[tuple[str, Color], ...]]:
 
 
 _PER_PIXEL = {"object_ids": _object_ids, "normals": _normals, "albedo": _albedo, "depth": _depth}
+"""The overlays that are made from first hits, by kind."""
 
 
 def _of_hits(aovs: Aovs, rgb: Pixels) -> Pixels:

@@ -52,7 +52,8 @@ def clip_from_world(
     across, down, depth = view
     x, y, width, height = rect_px
     part_x, part_y, part_width, part_height = part
-    # Along an axis of the viewport: the image's own -1 to 1, scaled and moved to where the viewport sees it.
+    # The image spans -1 to 1 of its own along each axis. This scales it and moves it to where the viewport
+    # sees it.
     scale_x, scale_y = width / part_width, height / part_height
     move_x = (2 * (x - part_x) + width) / part_width - 1
     move_y = 1 - (2 * (y - part_y) + height) / part_height
@@ -73,10 +74,10 @@ def covered(
     corners = np.concatenate([transform.box_corners(o.world_bounds) for o in objects])
     pixels, in_front = transform.project(corners, camera.position, frame, (1, 1))
     if not in_front.all():
-        # What a box that reaches behind the camera covers is no box around its corners.
+        # A box that reaches behind the camera covers more than the rectangle around its projected corners.
         return part
     low, high = pixels.min(axis=0), pixels.max(axis=0)
-    # Beyond this there is nothing to draw, and whole numbers of pixels would no longer be exact.
+    # Pixels beyond this are never drawn, and their numbers would no longer be exact as floats.
     low, high = np.clip([low, high], -1e6, 1e6)
     size = np.array([rect_px.width, rect_px.height])
     x, y = (rect_px.left, rect_px.top) + low * size - margin

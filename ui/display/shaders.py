@@ -23,7 +23,6 @@ def _glsl(values: object) -> str:
     return ", ".join(f"{value:.9g}" for value in np.ravel(np.asarray(values, np.float64)))
 
 
-# The constants are those of incpt.picture.tone_mapping. GLSL takes matrices column by column.
 _CURVES = f"""
 const mat3 agx_inset = mat3({_glsl(tone_mapping.AGX_INSET.T)});
 const mat3 agx_outset = mat3({_glsl(tone_mapping.AGX_OUTSET.T)});
@@ -34,6 +33,7 @@ const float hable_white = {_glsl(tone_mapping.HABLE_WHITE)};
 const float hable_bias = {_glsl(tone_mapping.HABLE_EXPOSURE_BIAS)};
 const vec3 undefined_pixel = vec3({_glsl(np.array(tone_mapping.UNDEFINED_PIXEL) / 255)});
 """
+"""The constants of incpt.picture.tone_mapping in GLSL, which takes matrices column by column."""
 
 TONE_MAP = f"""#version 330 core
 {_CURVES}

@@ -16,6 +16,7 @@ from PIL import Image
 from incpt.core.errors import OutputError
 
 _SECONDS = 5.0
+"""How long the system's tool may take."""
 
 
 def copy_picture(pixels: npt.NDArray[np.uint8]) -> None:

@@ -19,7 +19,9 @@ from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
 
 SUFFIX = ".toml"
+"""The suffix of a scene file."""
 UNTITLED = "untitled"
+"""What a document without a file is called."""
 
 
 class Document:

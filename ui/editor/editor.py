@@ -29,6 +29,7 @@ OpenRenderer = Callable[[str | None], Renderer]
 """Opens a renderer on a device, given by name or None for the default."""
 
 _REFUSALS = (InputError, OutputError, DeviceError)
+"""What an action raises where it refuses: these become messages, anything else is a fault of the program."""
 
 
 class Editor:

@@ -6,8 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 LEVELS = ("done", "warning", "error")
+"""What a message is: good news, a remark, or something that failed."""
 _SECONDS = {"done": 5.0, "warning": 15.0}
+"""How long a message of a level is shown; one of another level stays until it is dismissed."""
 _MOST = 6
+"""How many messages are shown at once."""
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from incpt.viewer.viewer import Frame
 
 _MOST_POINTS = 600
+"""How many values of a quantity are kept."""
 
 
 @dataclass(frozen=True)

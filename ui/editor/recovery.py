@@ -28,7 +28,9 @@ from incpt.ui.editor.document import UNTITLED, Document, collected_warnings
 from incpt.ui.preferences import CONFIG_DIR
 
 _ORIGINAL = "# original: "
+"""How the first line of a recovery file begins; the path of the scene file follows as JSON."""
 _LOCK = ".lock"
+"""The suffix of the file whose lock tells that the editor runs."""
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from incpt.ui.preferences import DisplaySettings
 from incpt.ui.widgets import widgets
-from incpt.ui.widgets.widgets import Refusals
+from incpt.ui.widgets.refusals import Refusals
 
 CURVE_TEXTS = {"agx": "AgX", "filmic": "Filmic", "srgb": "sRGB, clipped"}
 """How the panel names the curves of tone mapping."""
@@ -36,16 +34,13 @@ def draw(display: DisplaySettings, refusals: Refusals) -> DisplaySettings:
     grid = widgets.checkbox("Tile grid", display.tile_grid)
     outline = widgets.checkbox("Outline", display.outline, "Around the selection")
     split = widgets.checkbox("Split view", display.split, "Left: restart, right: the chosen strategy")
-    return refusals.accepted(
+    return refusals.changed(
         display,
-        lambda: replace(
-            display,
-            exposure=exposure,
-            curve=curve,
-            overlay=overlay,
-            overlay_opacity=opacity,
-            tile_grid=grid,
-            outline=outline,
-            split=split,
-        ),
+        exposure=exposure,
+        curve=curve,
+        overlay=overlay,
+        overlay_opacity=opacity,
+        tile_grid=grid,
+        outline=outline,
+        split=split,
     )

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 from incpt.scene.material import Material
 from incpt.ui.widgets import widgets
-from incpt.ui.widgets.widgets import Refusals
+from incpt.ui.widgets.refusals import Refusals
 
 
 @dataclass(frozen=True)
@@ -38,71 +37,56 @@ def draw_choice(names: tuple[str, ...], current: str, users: int) -> Outcome:
 
 def draw(material: Material, refusals: Refusals) -> Material:
     """Fields for all parameters; returns the material after this frame."""
-    material = _set(
-        material,
-        refusals,
-        "base_color",
-        widgets.color(
-            "Base colour", material.base_color, tip="Diffuse albedo; of metals the reflectance. Linear RGB"
-        ),
+    color = widgets.color(
+        "Base colour", material.base_color, tip="Diffuse albedo; of metals the reflectance. Linear RGB"
     )
-    material = _share(material, refusals, "metallic", "Metallic", "0: dielectric, 1: metal")
-    material = _share(material, refusals, "roughness", "Roughness", "GGX alpha is its square")
-    material = _share(material, refusals, "specular", "Specular", "Dielectric layer; 0 is exactly Lambertian")
-    material = _set(
-        material,
-        refusals,
-        "ior",
-        widgets.number("IOR", material.ior, low=1.0, high=4.0, speed=0.005, tip="Index of refraction"),
+    material = refusals.changed(material, base_color=color)
+    material = _draw_share(material, refusals, "metallic", "Metallic", "0: dielectric, 1: metal")
+    material = _draw_share(material, refusals, "roughness", "Roughness", "GGX alpha is its square")
+    material = _draw_share(
+        material, refusals, "specular", "Specular", "Dielectric layer; 0 is exactly Lambertian"
     )
-    material = _draw_glass(material, refusals)
-    return _draw_emission(material, refusals)  # fmt: skip
+    ior = widgets.number("IOR", material.ior, low=1.0, high=4.0, speed=0.005, tip="Index of refraction")
+    material = refusals.changed(material, ior=ior)
+    return _draw_emission(_draw_transmission(material, refusals), refusals)
 
 
-def _draw_glass(material: Material, refusals: Refusals) -> Material:
+def _draw_transmission(material: Material, refusals: Refusals) -> Material:
     with widgets.section("Transmission", material.transmission > 0) as is_open:
         if not is_open:
             return material
-        material = _share(material, refusals, "transmission", "Transmission", "1: glass")
-        material = _set(
-            material,
-            refusals,
-            "absorption",
-            widgets.vector(
-                "Absorption",
-                material.absorption,
-                speed=0.05,
-                high=1e6,
-                unit=" /m",
-                names=("R", "G", "B"),
-                tip="Per metre of the way inside",
-            ),
+        material = _draw_share(material, refusals, "transmission", "Transmission", "1: glass")
+        absorption = widgets.vector(
+            "Absorption",
+            material.absorption,
+            speed=0.05,
+            high=1e6,
+            unit=" /m",
+            names=("R", "G", "B"),
+            tip="Per metre of the way inside",
         )
-        return _set(material, refusals, "priority", widgets.whole_number(
-            "Priority", material.priority, low=0, high=1000,
-            tip="Where bodies overlap the higher wins; 0 is the highest of all"))  # fmt: skip
+        material = refusals.changed(material, absorption=absorption)
+        priority = widgets.whole_number(
+            "Priority",
+            material.priority,
+            low=0,
+            high=1000,
+            tip="Where bodies overlap the higher wins; 0 is the highest of all",
+        )
+        return refusals.changed(material, priority=priority)
 
 
 def _draw_emission(material: Material, refusals: Refusals) -> Material:
     with widgets.section("Emission", material.is_emissive) as is_open:
         if not is_open:
             return material
-        material = _set(
-            material,
-            refusals,
-            "emission",
-            widgets.radiance("Emission", material.emission, tip="Radiance: colour times strength"),
-        )
-        return _set(material, refusals, "double_sided", widgets.checkbox(
-            "Double sided", material.double_sided, "Emission from the back too"))  # fmt: skip
+        emission = widgets.radiance("Emission", material.emission, tip="Radiance: colour times strength")
+        material = refusals.changed(material, emission=emission)
+        is_double = widgets.checkbox("Double sided", material.double_sided, "Emission from the back too")
+        return refusals.changed(material, double_sided=is_double)
 
 
-def _share(material: Material, refusals: Refusals, name: str, label: str, tip: str) -> Material:
+def _draw_share(material: Material, refusals: Refusals, name: str, label: str, tip: str) -> Material:
+    """A parameter between 0 and 1."""
     value = widgets.number(label, getattr(material, name), low=0.0, high=1.0, speed=0.005, tip=tip)
-    return _set(material, refusals, name, value)
-
-
-def _set(material: Material, refusals: Refusals, name: str, value: Any) -> Material:
-    if value == getattr(material, name):
-        return material
-    return refusals.accepted(material, lambda: replace(material, **{name: value}))
+    return refusals.changed(material, **{name: value})

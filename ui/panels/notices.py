@@ -14,6 +14,7 @@ from incpt.ui.widgets import places, theme
 from incpt.viewer.viewer import Frame
 
 _COLORS = {"done": theme.QUIET, "warning": theme.WARNING, "error": theme.ERROR}
+"""Colours of messages, by level."""
 _FLOATING = (
     imgui.WindowFlags_.no_decoration
     | imgui.WindowFlags_.no_docking
@@ -22,6 +23,7 @@ _FLOATING = (
     | imgui.WindowFlags_.no_nav
     | imgui.WindowFlags_.always_auto_resize
 )
+"""Windows over the picture that a user cannot move."""
 
 
 def draw_status_bar(text: str) -> None:

@@ -25,7 +25,7 @@ def draw(records: Records, step_ms: float) -> None:
         imgui.text_disabled("Pin a reference (F9) to plot the error.")
         return
     if implot.begin_plot("Error##plot", imgui.ImVec2(-1, height * 1.6), flags):
-        # Errors fall: there is room at the upper right.
+        # Errors fall, so there is room for the legend at the upper right.
         implot.setup_legend(implot.Location_.north_east)
         implot.setup_axes("seconds", "RMSE", implot.AxisFlags_.auto_fit, implot.AxisFlags_.auto_fit)
         implot.setup_axis_scale(implot.ImAxis_.y1, implot.Scale_.log10)

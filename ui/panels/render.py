@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 from imgui_bundle import imgui
 
@@ -13,7 +12,7 @@ from incpt.render.modes import Mode
 from incpt.ui.editor.state import Control
 from incpt.ui.preferences import Preferences
 from incpt.ui.widgets import places, widgets
-from incpt.ui.widgets.widgets import Refusals
+from incpt.ui.widgets.refusals import Refusals
 from incpt.viewer.viewer import Frame, Picture
 
 MODE_TEXTS = {
@@ -26,6 +25,7 @@ STRATEGY_TEXTS = {"restart": "Restart", "spiral": "Spiral"}
 """What a strategy is called where it is chosen; one that is not here is called by its name."""
 _STRATEGY_TIP = "Restart: an edit starts everything anew. Spiral: from the edit outwards, the rest is kept"
 _TILE_SIZES = (8, 16, 32, 64, 128)
+"""Tile sizes that are offered, in pixels."""
 
 
 def draw_state(frame: Frame | None) -> None:
@@ -95,10 +95,7 @@ def draw_control(
     # A percentage that was not touched stays to the bit, which multiplying and dividing would round.
     scale = preferences.resolution_scale if new_percent == percent else new_percent / 100
     control = replace(control, paused=paused, target_spp=target or None)
-    preferences = refusals.accepted(
-        preferences,
-        lambda: replace(preferences, resolution_scale=scale, step_ms=step_ms, drag_nor=drag_nor),
-    )
+    preferences = refusals.changed(preferences, resolution_scale=scale, step_ms=step_ms, drag_nor=drag_nor)
     return control, preferences, is_restart
 
 
@@ -106,10 +103,10 @@ def draw_settings(settings: RenderSettings, refusals: Refusals) -> RenderSetting
     """The scene's render settings; returns them after this frame."""
     strategies = [(name, STRATEGY_TEXTS.get(name, name)) for name in STRATEGIES]
     strategy = widgets.choice("Strategy", settings.strategy, strategies, _STRATEGY_TIP)
-    settings = _set(settings, refusals, strategy=strategy)
+    settings = refusals.changed(settings, strategy=strategy)
     sizes = [(str(size), f"{size} × {size}") for size in sorted({*_TILE_SIZES, settings.tile_size})]
     tile_size = int(widgets.choice("Tile size", str(settings.tile_size), sizes, "Pixels"))
-    settings = _set(settings, refusals, tile_size=tile_size)
+    settings = refusals.changed(settings, tile_size=tile_size)
     for name, label, low, high, tip in (
         ("nor", "NoR", 1, 1 << 16, "Repetitions of a tile while an edit is rendered"),
         ("base_nor", "Base NoR", 1, 1 << 10, "Repetitions in Base and Refine"),
@@ -119,13 +116,7 @@ def draw_settings(settings: RenderSettings, refusals: Refusals) -> RenderSetting
         ("seed", "Seed", 0, (1 << 31) - 1, "Chooses the random numbers"),
     ):
         value = widgets.whole_number(label, getattr(settings, name), low=low, high=high, tip=tip)
-        settings = _set(settings, refusals, **{name: value})
+        settings = refusals.changed(settings, **{name: value})
     width = widgets.whole_number("Width", settings.size[0], low=16, high=8192, speed=2.0, tip="Pixels")
     height = widgets.whole_number("Height", settings.size[1], low=16, high=8192, speed=2.0, tip="Pixels")
-    return _set(settings, refusals, size=(width, height))
-
-
-def _set(settings: RenderSettings, refusals: Refusals, **changes: Any) -> RenderSettings:
-    if all(getattr(settings, name) == value for name, value in changes.items()):
-        return settings
-    return refusals.accepted(settings, lambda: replace(settings, **changes))
+    return refusals.changed(settings, size=(width, height))

@@ -7,7 +7,7 @@ from dataclasses import replace
 from incpt.ui.editor.state import Tool
 from incpt.ui.preferences import RANGES, SnapSettings
 from incpt.ui.widgets import widgets
-from incpt.ui.widgets.widgets import Refusals
+from incpt.ui.widgets.refusals import Refusals
 
 OPERATIONS = (("move", "Move"), ("rotate", "Rotate"), ("scale", "Scale"))
 """What the gizmo does, and how the panel names it."""
@@ -24,8 +24,7 @@ def draw(tool: Tool, snap: SnapSettings, refusals: Refusals) -> tuple[Tool, Snap
         move_m = _step("Step of moves", "move_m", snap.move_m, 0.01, " m")
         rotate_deg = _step("Step of turns", "rotate_deg", snap.rotate_deg, 0.5, "°")
         scale = _step("Step of scale", "scale", snap.scale, 0.01, "")
-        old = snap
-        snap = refusals.accepted(old, lambda: replace(old, move_m=move_m, rotate_deg=rotate_deg, scale=scale))
+        snap = refusals.changed(snap, move_m=move_m, rotate_deg=rotate_deg, scale=scale)
     return Tool(operation, space), snap
 
 

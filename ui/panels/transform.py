@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from incpt.core.transform import Vector
 from incpt.scene.model import Object
 from incpt.ui.widgets import widgets
-from incpt.ui.widgets.widgets import Refusals
+from incpt.ui.widgets.refusals import Refusals
 
 
 def draw(obj: Object, is_uniform: bool, refusals: Refusals) -> tuple[Object, bool]:
     """Fields for the transform; returns the object after this frame, and whether scale keeps its
     proportions."""
     position = widgets.vector("Position", obj.position, speed=0.01, unit=" m", tip="World space, metres")
-    obj = _changed(obj, "position", position, refusals)
+    obj = refusals.changed(obj, position=position)
     rotation = widgets.vector(
         "Rotation", obj.rotation, speed=0.5, unit="°", decimals=2, tip="Degrees about x, then y, then z"
     )
-    obj = _changed(obj, "rotation", rotation, refusals)
+    obj = refusals.changed(obj, rotation=rotation)
     scale = widgets.vector("Scale", obj.scale, speed=0.01, tip="Factor along the object's own axes")
     scale = proportional(obj.scale, scale) if is_uniform else scale
-    obj = _changed(obj, "scale", scale, refusals)
+    obj = refusals.changed(obj, scale=scale)
     is_uniform = widgets.checkbox("Uniform scale", is_uniform, "One field of the scale changes all three")
     return _reset_buttons(obj), is_uniform
 
@@ -34,13 +33,6 @@ def proportional(old: Vector, new: Vector) -> Vector:
             x, y, z = (component * after / before for component in old)
             return x, y, z
     return new
-
-
-def _changed(obj: Object, name: str, value: Vector, refusals: Refusals) -> Object:
-    if value == getattr(obj, name):
-        return obj
-    changes: dict[str, Any] = {name: value}
-    return refusals.accepted(obj, lambda: replace(obj, **changes))
 
 
 def _reset_buttons(obj: Object) -> Object:

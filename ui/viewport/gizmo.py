@@ -24,6 +24,7 @@ from incpt.ui.rect import Rect
 from incpt.ui.widgets import places
 
 Matrix = npt.NDArray[np.float64]
+"""(4, 4), for columns."""
 
 _gizmo = imguizmo.im_guizmo
 _OPERATIONS = {
@@ -31,7 +32,9 @@ _OPERATIONS = {
     "rotate": _gizmo.OPERATION.rotate,
     "scale": _gizmo.OPERATION.scale,
 }
+"""ImGuizmo's operations, by those of `Tool`."""
 _NEAR, _FAR = 0.01, 10000.0
+"""The nearest and the farthest distance from the camera at which handles are drawn, in metres."""
 
 
 @dataclass
@@ -135,7 +138,7 @@ def projection_matrix(camera: Camera, aspect: float) -> Matrix:
 
 
 def _flat(matrix: Matrix) -> imguizmo.im_guizmo.Matrix16:
-    # Column by column, as OpenGL's matrices lie in memory.
+    # OpenGL's matrices lie in memory column by column.
     return _gizmo.Matrix16(matrix.T.ravel().tolist())
 
 

@@ -238,7 +238,7 @@ class Viewport:
             return False
         if button is Button.LEFT:
             return not (imgui.get_io().want_capture_mouse or self.gizmo.is_over)
-        # want_capture_mouse does not tell here, because a handle under the mouse sets it too.
+        # want_capture_mouse does not help here, because a handle of the gizmo under the mouse sets it too.
         is_over_panel = imgui.is_window_hovered(_ANY_WINDOW) or imgui.is_any_item_active()
         return not (is_over_panel or imgui.is_popup_open("", _ANY_POPUP))
 

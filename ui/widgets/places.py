@@ -8,7 +8,9 @@ from imgui_bundle import imgui
 from incpt.ui.rect import Rect
 
 _drawing: dict[str, Rect[float]] = {}
+"""Places noted in the frame that is being drawn."""
 _drawn: dict[str, Rect[float]] = {}
+"""Places noted in the frame before."""
 
 
 def begin_frame() -> None:

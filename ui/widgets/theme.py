@@ -11,13 +11,18 @@ FONT_SIZE = 15.0
 """Height of text at 100 % scale, in points of the screen."""
 
 Rgba = tuple[float, float, float, float]
+"""sRGB with alpha, 0 to 1."""
 
 ACCENT: Rgba = (0.91, 0.49, 0.16, 1.0)
 """Of the selection's outline too, so that a marked row and a marked object are seen to belong together."""
 TEXT: Rgba = (0.88, 0.88, 0.88, 1.0)
+"""Of ordinary text."""
 QUIET: Rgba = (0.60, 0.60, 0.60, 1.0)
+"""Of text that stays in the background."""
 WARNING: Rgba = (0.98, 0.75, 0.25, 1.0)
+"""Of what was refused or lost."""
 ERROR: Rgba = (1.00, 0.45, 0.40, 1.0)
+"""Of what failed."""
 
 _COLORS: dict[str, Rgba] = {
     "text": TEXT,
@@ -60,6 +65,7 @@ _COLORS: dict[str, Rgba] = {
     "text_selected_bg": (0.91, 0.49, 0.16, 0.45),
     "drag_drop_target": ACCENT,
 }
+"""All colours of imgui's that are not its own, by its names for them."""
 
 
 def load_font() -> None:

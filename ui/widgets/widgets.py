@@ -6,38 +6,23 @@ Each stands in a row of its own: label on the left, field on the right. A value 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TypeVar
 
 import numpy as np
 from imgui_bundle import imgui
 
-from incpt.core.errors import InputError, one_line
 from incpt.core.transform import Vector
 from incpt.ui.widgets import places, theme
 
-T = TypeVar("T")
-
 _AXES = ("X", "Y", "Z")
+"""Names of the fields of a vector."""
 _AXIS_COLORS = ((0.90, 0.35, 0.38, 1.0), (0.52, 0.78, 0.30, 1.0), (0.35, 0.58, 0.95, 1.0))
+"""Colours of the marks beside those fields, as in the gizmo."""
 _LABEL_SHARE = 0.38
+"""Width of a label, as a share of its row's."""
 _edited = [0]
-
-
-class Refusals:
-    """What the fields of a panel refused in this frame, in the words of the error."""
-
-    def __init__(self) -> None:
-        self.messages: list[str] = []
-
-    def accepted(self, old: T, make: Callable[[], T]) -> T:
-        """`make()`, or the old value where that raises InputError: the field keeps the last good one."""
-        try:
-            return make()
-        except InputError as error:
-            self.messages.append(one_line(str(error)))
-            return old
+"""imgui's number of the widget whose value changed last; a list of one, so that functions can set it."""
 
 
 @contextmanager
@@ -78,7 +63,7 @@ def number(
 def whole_number(label: str, value: int, *, low: int, high: int, speed: float = 0.1, tip: str = "") -> int:
     """A whole number to drag or to type, held between `low` and `high`."""
     with row(label, tip) as field:
-        # A file may hold numbers that the widget does not offer, or that imgui's 32 bits do not.
+        # A file may hold numbers beyond the bounds of the widget, or beyond imgui's 32 bits.
         shown = min(max(value, -(1 << 31)), (1 << 31) - 1)
         flags = imgui.SliderFlags_.always_clamp
         changed, result = imgui.drag_int(field, shown, speed, low, high, "%d", flags)
@@ -122,7 +107,7 @@ def color(label: str, value: Vector, *, is_radiance: bool = False, tip: str = ""
         shown = list(map(_rounded, value))
         changed, result = imgui.color_edit3(field, shown, flags)
         _note(label, changed)
-    # What was not touched stays to the bit, which imgui's 32 bits would round.
+    # A component that was not touched keeps its value to the bit; imgui's 32 bits would round it.
     r, g, b = (old if new == seen else new for old, seen, new in zip(value, shown, result, strict=True))
     return r, g, b
 
@@ -220,12 +205,6 @@ def note(message: str, color: theme.Rgba = theme.QUIET) -> None:
     imgui.pop_style_color()
 
 
-def show_refusals(refusals: Refusals) -> None:
-    """What was refused in this frame."""
-    for message in refusals.messages:
-        note(message, theme.WARNING)
-
-
 def edited() -> int:
     """imgui's number of the widget whose value changed last: what the edits of one drag have in common."""
     return _edited[0]
@@ -238,7 +217,7 @@ def _note(name: str, has_changed: bool) -> None:
 
 
 def _axis_mark(axis: int, name: str) -> None:
-    # Left of the field that follows, where no widget stands.
+    # It is drawn to the left of the field that follows, where no widget stands.
     at, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height()
     width = max(2.0, height * 0.12)
     draw = imgui.get_window_draw_list()
