@@ -8,9 +8,10 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 if not os.environ.get("CI"):
@@ -18,6 +19,8 @@ if not os.environ.get("CI"):
 
 from imgui_bundle import imgui, implot
 
+from incpt.render import tiles
+from incpt.render.modes import Mode
 from incpt.scene.image import Image
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Scene
@@ -30,7 +33,8 @@ from incpt.ui.rect import Rect
 from incpt.ui.viewport.viewport import Viewport
 from incpt.ui.widgets import places, theme
 from incpt.ui.workspace import Workspace
-from incpt.viewer.threaded import NullRenderer, Renderer
+from incpt.viewer.threaded import Message, NullRenderer, Renderer
+from incpt.viewer.viewer import Frame, Picture, View
 
 WINDOW = (1600, 1900)
 """Tall enough that no panel has to be scrolled."""
@@ -323,3 +327,28 @@ def changes(before: dict[str, Any], after: dict[str, Any]) -> set[str]:
     """The places whose value is another one, or that came or went."""
     gone = object()
     return {name for name in {**before, **after} if before.get(name, gone) != after.get(name, gone)}
+
+
+def frame_of(view: View, mode: Mode = Mode.REFINE, spp: int = 4, error: float | None = None) -> Frame:
+    """What a renderer would send: a grey picture."""
+    grid = tiles.TileGrid(*view.size, view.scene.settings.tile_size)
+    picture = Picture(
+        image=np.full((view.size[1], view.size[0], 4), 0.5, np.float32),
+        grid=grid,
+        mode=mode,
+        queue=np.arange(grid.count, dtype=np.int32),
+        queue_done=2,
+        tile_spp=np.full(grid.count, spp, np.int64),
+        replaced=np.ones(grid.count, np.bool_),
+        seconds=1.0,
+        error=error,
+        strategy=view.scene.settings.strategy,
+    )
+    pictures = (replace(picture, strategy="restart"), picture) if view.split else (picture,)
+    return Frame(view, pictures, False, 0.02, 1e6, "a device", None, 0, False)
+
+
+def tell(user: Desk, *messages: Message) -> None:
+    """The renderer says something."""
+    user.null.messages += messages
+    user.frames(3)  # a window that appears has its size and place in its second frame

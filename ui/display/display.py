@@ -80,22 +80,19 @@ class Display:
     ) -> None:
         """Draw into the framebuffer that is bound.
 
-        `rect_px` is where the image lies, (x, y, width, height) in pixels of the framebuffer from its top
-        left corner; it may reach beyond it. `clip_px`, by default the whole framebuffer, is where drawing is
-        allowed. `scale` is the DPI scale, for lines. Leaves viewport and blending as imgui's renderer, which
-        sets its own, may have them; restores the bound framebuffer.
+        `rect_px` is where the image lies in the framebuffer; it may reach beyond it. `clip_px`, by default
+        the whole framebuffer, is where drawing is allowed. `scale` is the DPI scale, for lines. Leaves
+        viewport and blending as imgui's renderer, which sets its own, may have them; restores the bound
+        framebuffer.
         """
-        bounds = (
-            [Rect(0, 0, *framebuffer_size)] if clip_px is None else [clip_px, Rect(0, 0, *framebuffer_size)]
-        )
-        area = whole_pixels(rect_px, *bounds)
+        whole = Rect(0, 0, *framebuffer_size)
+        area = whole_pixels(rect_px, clip_px or whole, whole)
         if not self._sides or area is None:
             return
         context, target, height = self._context, self._context.fbo, framebuffer_size[1]
         context.enable_only(moderngl.NOTHING)
-        bar_x = (
-            split_x(rect_px, settings.split_position) if settings.split and len(self._sides) == 2 else None
-        )
+        is_split = settings.split and len(self._sides) == 2
+        bar_x = split_x(rect_px, settings.split_position) if is_split else None
         shown = self._shown(area, bar_x)
         for side, _ in shown:
             self._map(side, settings)

@@ -1,4 +1,4 @@
-"""The editor as a whole: what the renderer is shown, what it answers, the mouse in the picture, undo."""
+"""The editor as a whole: what the renderer is shown, what it answers, undo of anything."""
 
 from __future__ import annotations
 
@@ -7,15 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support.small_scenes import mixed_scene
-from support.ui_harness import Desk, changes, desk, flat, state
+from support.ui_harness import Desk, changes, desk, flat, frame_of, state, tell
 
 from incpt.core.errors import DeviceError, InputError
-from incpt.render import tiles
 from incpt.render.modes import Mode
 from incpt.scene import edits
 from incpt.scene.model import Scene
@@ -23,9 +21,8 @@ from incpt.scene.selection import Selection
 from incpt.ui.commands import command, materials, objects, pictures, table
 from incpt.ui.editor.messages import Messages
 from incpt.ui.panels.notices import status_text
-from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
-from incpt.viewer.threaded import Building, Export, Exported, Message, Pick, Picked, Pin, Problem
-from incpt.viewer.viewer import Frame, Picture, View
+from incpt.ui.preferences import DisplaySettings, Preferences
+from incpt.viewer.threaded import Building, Export, Exported, Pin, Problem
 
 SCENE = mixed_scene(size=(48, 32))
 
@@ -34,30 +31,6 @@ SCENE = mixed_scene(size=(48, 32))
 def user() -> Iterator[Desk]:
     with desk(SCENE) as made:
         yield made
-
-
-def frame_of(view: View, mode: Mode = Mode.REFINE, spp: int = 4, error: float | None = None) -> Frame:
-    """What a renderer would send: a grey picture."""
-    grid = tiles.TileGrid(*view.size, view.scene.settings.tile_size)
-    picture = Picture(
-        image=np.full((view.size[1], view.size[0], 4), 0.5, np.float32),
-        grid=grid,
-        mode=mode,
-        queue=np.arange(grid.count, dtype=np.int32),
-        queue_done=2,
-        tile_spp=np.full(grid.count, spp, np.int64),
-        replaced=np.ones(grid.count, np.bool_),
-        seconds=1.0,
-        error=error,
-        strategy=view.scene.settings.strategy,
-    )
-    pictures = (replace(picture, strategy="restart"), picture) if view.split else (picture,)
-    return Frame(view, pictures, False, 0.02, 1e6, "a device", None, 0, False)
-
-
-def tell(user: Desk, *messages: Message) -> None:
-    user.null.messages += messages
-    user.frames(3)  # a window that appears has its size and place in its second frame
 
 
 # ---------------------------------------------------------------------------------------- what is shown
@@ -132,276 +105,6 @@ def test_controls_reach_the_renderer(user: Desk) -> None:
     user.click("Go on")
     user.type("Target spp", "0")
     assert user.null.views[-1] == replace(wanted, paused=False, target_spp=None)
-
-
-# ------------------------------------------------------------------------------------ mouse in the picture
-
-
-def test_a_click_picks_and_clicks_on_nothing_deselect(user: Desk) -> None:
-    for button in (0, 1):
-        where = user.at_picture(0.5, 0.5)
-        user.null.picks = dict.fromkeys([(0.5, 0.5)], "red cube")
-        user.click_at(*where, button)
-        (request,) = user.null.requests
-        assert isinstance(request, Pick) and not request.additive
-        assert (
-            request.point == pytest.approx((0.5, 0.5), abs=2e-3)
-            and user.editor.control.point == request.point
-        )
-        tell(user, Picked(request.point, "red cube", False))
-        assert user.editor.selection.names == ("red cube",)
-        user.null.requests.clear()
-        user.click_at(*user.at_picture(0.05, 0.05), button)
-        assert not user.editor.selection
-        user.null.requests.clear()
-    assert user.scene is SCENE and user.undo_count == 0
-
-
-def test_ctrl_picks_more_than_one(user: Desk) -> None:
-    user.editor.select(Selection(("lamp",)))
-    with user.held_keys("Ctrl"):
-        user.click_at(*user.at_picture(0.3, 0.1))
-    assert isinstance(user.null.requests[-1], Pick) and user.null.requests[-1].additive
-    tell(user, Picked((0.3, 0.1), "red cube", True))
-    assert user.editor.selection.names == ("lamp", "red cube")
-    tell(user, Picked((0.3, 0.1), "lamp", True))
-    assert user.editor.selection.names == ("red cube",)
-    tell(user, Picked((0.3, 0.1), None, True))
-    assert user.editor.selection.names == ("red cube",)
-    tell(user, Picked((0.3, 0.1), None, False))
-    assert user.editor.selection.names == ()
-
-
-def test_a_click_beside_the_picture_deselects(user: Desk) -> None:
-    beside = (user.area.left + 20, user.area.top + 20)
-    assert beside[1] < user.picture.top
-    user.editor.select(Selection(("lamp",)))
-    with user.held_keys("Ctrl"):
-        user.click_at(*beside)
-    assert user.editor.selection.names == ("lamp",)
-    user.click_at(*beside)
-    assert user.editor.selection.names == () and not user.null.requests and user.editor.control.point is None
-
-
-def test_a_pick_of_what_is_gone_selects_nothing(user: Desk) -> None:
-    user.editor.select(Selection(("lamp",)))
-    tell(user, Picked((0.5, 0.5), "gone", False))
-    assert user.editor.selection.names == ()
-    user.editor.select(Selection(("lamp",)))
-    tell(user, Picked((0.5, 0.5), "gone", True))
-    assert user.editor.selection.names == ("lamp",)
-
-
-@pytest.mark.parametrize(
-    ("navigation", "button", "modifiers", "label"),
-    [
-        ("blender", 2, "", "Orbit"),
-        ("blender", 2, "Shift", "Pan"),
-        ("blender", 2, "Ctrl", "Dolly"),
-        ("blender", 0, "Alt", "Orbit"),
-        ("plain", 0, "", "Orbit"),
-        ("plain", 2, "", "Pan"),
-        ("plain", 0, "Shift", "Pan"),
-        ("plain", 1, "Alt", "Dolly"),
-        ("plain", 1, "", "Fly"),
-    ],
-)
-def test_a_drag_moves_the_camera(
-    user: Desk, navigation: str, button: int, modifiers: str, label: str
-) -> None:
-    user.editor.choose_navigation(navigation)
-    start = user.at_picture(0.2, 0.2)
-    if modifiers:
-        with user.held_keys(modifiers):
-            user.drag_at(start, (60.0, 40.0), button=button)
-    else:
-        user.drag_at(start, (60.0, 40.0), button=button)
-    user.frames(2)
-    changed = changes(flat(SCENE), flat(user.scene))
-    assert changed and all(place.startswith("camera.") for place in changed)
-    assert user.editor.document.history.undo_label == label and user.undo_count == 1
-    assert not user.null.requests and not user.editor.gesture.is_flying
-    user.key("Ctrl+Z")
-    assert user.scene == SCENE
-
-
-def test_a_drag_with_the_selecting_button_alone_does_nothing_in_blenders_set(user: Desk) -> None:
-    user.drag_at(user.at_picture(0.2, 0.2), (60.0, 40.0))
-    assert user.scene is SCENE and not user.null.requests
-
-
-def test_a_camera_drag_is_given_up_by_escape(user: Desk) -> None:
-    x, y = user.at_picture(0.2, 0.2)
-    user.editor.select(Selection(("lamp",)))
-    user.hold_at((x, y), (60.0, 40.0), button=2)
-    assert user.scene != SCENE and user.editor.view.before is SCENE
-    user.key("Escape")
-    user.move(x + 100, y)
-    user.release(2)
-    user.frames(2)
-    assert user.scene == SCENE and user.undo_count == 0 and user.editor.selection.names == ("lamp",)
-
-
-def test_turns_of_the_wheel_are_one_entry_until_they_rest(user: Desk) -> None:
-    user.move(*user.at_picture(0.2, 0.2))
-    for _ in range(3):
-        user.wheel(1.0)
-        user.frames(3)
-    assert user.editor.is_waiting and user.editor.document.history.before is SCENE
-    user.rest(1.0)
-    assert not user.editor.is_waiting and user.undo_count == 1
-    user.wheel(-1.0)
-    user.rest(1.0)
-    assert user.undo_count == 2
-
-
-def test_the_wheel_belongs_to_the_panel_under_it(user: Desk) -> None:
-    user.move(*user.place("object red cube"))
-    user.frame()
-    user.wheel(1.0)
-    assert user.scene is SCENE
-
-
-def test_the_gizmo_moves_what_is_selected(user: Desk) -> None:
-    user.editor.select(Selection(("red cube", "lamp")))
-    user.frames(2)
-    x, y = user.place("gizmo")
-    user.drag_at((x + 60, y), (60.0, 0.0))
-    moved = changes(flat(SCENE), flat(user.scene))
-    assert {p.split(".")[1] for p in moved} == {"red cube", "lamp"} and all(".position." in p for p in moved)
-    by = [
-        np.subtract(user.scene.object(name).position, SCENE.object(name).position)
-        for name in ("red cube", "lamp")
-    ]
-    np.testing.assert_allclose(by[0], by[1], atol=1e-6)
-    assert by[0][0] > 0.01 and np.abs(by[0][1:]).max() < 1e-5
-    assert user.place("gizmo") == pytest.approx((x + 60, y), abs=1.0)  # it follows the mouse
-    assert user.undo_count == 1 and user.editor.document.history.undo_label == "Move"
-    user.key("Ctrl+Z")
-    assert user.scene == SCENE
-
-
-def test_the_gizmo_moves_in_steps(user: Desk) -> None:
-    user.editor.preferences = replace(user.editor.preferences, snap=SnapSettings(True, move_m=0.25))
-    user.editor.select(Selection(("red cube",)))
-    user.frames(2)
-    x, y = user.place("gizmo")
-    user.drag_at((x + 60, y), (300.0, 0.0), steps=12)
-    moved = user.scene.object("red cube").position[0]
-    assert moved > 0 and moved / 0.25 == pytest.approx(round(moved / 0.25), abs=1e-4)
-
-
-def test_the_gizmo_turns_and_scales(user: Desk) -> None:
-    user.editor.select(Selection(("red cube",)))
-    user.run("Scale")
-    x, y = user.place("gizmo")
-    user.drag_at((x, y), (60.0, 0.0))
-    assert {p.split(".")[2] for p in changes(flat(SCENE), flat(user.scene))} == {"scale"}
-    user.key("Ctrl+Z")
-    assert user.scene == SCENE
-
-
-@pytest.mark.parametrize("keys", ["Escape", "Ctrl+Z"])
-def test_a_drag_of_the_gizmo_is_given_up(user: Desk, keys: str) -> None:
-    user.editor.select(Selection(("red cube",)))
-    user.frames(2)
-    x, y = user.place("gizmo")
-    user.hold_at((x + 60, y), (60.0, 0.0))
-    assert user.viewport.gizmo.is_using and user.scene != SCENE
-    user.key(keys)
-    assert user.scene == SCENE
-    user.move(x + 200, y)
-    user.move(x + 220, y)
-    user.release()
-    user.frames(2)
-    assert user.scene == SCENE and user.editor.selection.names == ("red cube",)
-    user.drag_at((x + 60, y), (60.0, 0.0))
-    assert user.scene != SCENE and user.undo_count == 1
-
-
-@pytest.mark.parametrize("keys", ["Shift+D", "Delete", "A", "H"])
-def test_an_edit_under_a_drag_of_the_gizmo_ends_it(user: Desk, keys: str) -> None:
-    user.editor.select(Selection(("red cube",)))
-    user.frames(2)
-    x, y = user.place("gizmo")
-    user.hold_at((x + 60, y), (60.0, 0.0))
-    user.key(keys)
-    scene = user.scene
-    user.move(x + 200, y)
-    user.move(x + 220, y)
-    user.release()
-    user.frames(2)
-    assert user.scene == scene
-
-
-def test_the_camera_moves_with_the_gizmo_under_the_mouse(user: Desk) -> None:
-    user.editor.select(Selection(("red cube",)))
-    user.frames(2)
-    x, y = user.place("gizmo")
-    user.move(x, y)
-    user.frames(2)
-    assert user.viewport.gizmo.is_over
-    user.wheel(1.0)
-    user.rest(1.0)
-    assert user.editor.document.history.undo_label == "Zoom"
-    user.drag_at((x, y), (60.0, 0.0), button=2)
-    assert user.editor.document.history.undo_label == "Orbit" and user.undo_count == 2
-
-
-def test_the_bar_of_the_split_view_is_dragged(user: Desk) -> None:
-    user.run("Split view")
-    before = state(user.editor)
-    width = user.picture.width
-    user.drag("split bar", width / 4)
-    after = state(user.editor)
-    assert changes(before, after) == {"preferences.display.split_position"}
-    assert after["preferences.display.split_position"] == pytest.approx(0.75, abs=0.01)
-    user.drag("split bar", width)
-    assert user.editor.preferences.display.split_position == 1.0
-    assert not user.null.requests and user.undo_count == 0
-
-
-def test_hidden_objects_have_no_gizmo(user: Desk) -> None:
-    user.editor.select(Selection(("red cube",)))
-    user.run("Hide")
-    assert not user.shows("gizmo")
-
-
-# ------------------------------------------------------------------------------------------- outliner
-
-
-def test_the_outliner_selects_hides_and_renames(user: Desk) -> None:
-    user.click("object lamp")
-    assert user.editor.selection.names == ("lamp",)
-    with user.held_keys("Ctrl"):
-        user.click("object red cube")
-    assert user.editor.selection.names == ("lamp", "red cube")
-    with user.held_keys("Shift"):
-        user.click("object floor")
-    assert set(user.editor.selection.names) == {"lamp", "red cube", "floor"}
-    assert user.editor.selection.active == "floor"
-    before = state(user.editor)
-    user.click("visible floor")
-    assert changes(before, state(user.editor)) == {"scene.objects.floor.visible"} and user.undo_count == 1
-    user.click("visible floor")
-    assert changes(before, state(user.editor)) == set()
-    user.open_field("object lamp")
-    user.key("Ctrl+A")
-    user.write("panel")
-    user.key("Enter")
-    assert user.scene.object("panel") and user.editor.selection.names == ("panel",)
-
-
-def test_the_search_leaves_what_fits(user: Desk) -> None:
-    before = state(user.editor)
-    user.click("Search")
-    user.write("L")
-    assert {o.name for o in SCENE.objects if user.shows(f"object {o.name}")} == {
-        "floor", "glass ball", "lamp",
-    }  # fmt: skip
-    user.write("zz")
-    assert not any(user.shows(f"object {o.name}") for o in SCENE.objects)
-    assert changes(before, state(user.editor)) == set()
 
 
 # ------------------------------------------------------------------------------ what the renderer tells

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 from collections import Counter
 from collections.abc import Iterator
 from itertools import pairwise
@@ -12,7 +11,6 @@ import pytest
 from support.small_scenes import mixed_scene
 from support.ui_harness import Desk, changes, desk, flat, places, state
 
-import incpt.ui
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
 from incpt.scene.shapes import SHAPES
@@ -330,41 +328,3 @@ def test_fly_keys_are_no_commands_while_flying(user: Desk) -> None:
     assert not user.editor.gesture.is_flying and user.undo_count == 1
     assert {key.key.upper() for key in bindings.FLY_KEYS} & {one.keys for one in COMMANDS}  # they would clash
     assert bindings.action_for("blender", Button.GRAVE, ["shift"]) is Action.FLY
-
-
-# --------------------------------------------------------------------------------------------- the source
-
-
-def test_no_function_of_the_panels_is_long() -> None:
-    folder = Path(incpt.ui.__path__[0])
-    too_long = []
-    for path in [
-        *sorted((folder / "panels").glob("*.py")),
-        folder / "workspace.py",
-        folder / "widgets/widgets.py",
-    ]:
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
-                length = (node.end_lineno or 0) - node.lineno + 1
-                if length > 42:
-                    too_long.append(f"{path.name}: {node.name} has {length} lines")
-    assert too_long == []
-
-
-RENDERER = ("moderngl", "glfw", "incpt.viewer.threaded", "incpt.render.session", "incpt.device")
-
-
-@pytest.mark.parametrize(
-    ("folder", "forbidden"),
-    [
-        ("widgets", (*RENDERER, "incpt.ui.editor", "incpt.scene")),
-        ("panels", (*RENDERER, "incpt.ui.display", "incpt.ui.editor.editor")),
-        ("dialogs", (*RENDERER, "incpt.ui.display", "incpt.ui.editor.editor")),
-        ("viewport", ("moderngl", "glfw", "incpt.render.session", "incpt.device", "incpt.ui.editor.editor")),
-    ],
-)
-def test_what_draws_values_knows_no_editor_and_no_renderer(folder: str, forbidden: tuple[str, ...]) -> None:
-    for path in (Path(incpt.ui.__path__[0]) / folder).glob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            if isinstance(node, ast.ImportFrom):
-                assert not (node.module or "").startswith(forbidden), path
