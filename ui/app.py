@@ -26,7 +26,7 @@ from incpt.viewer.viewer import Frame
 _IDLE_SECONDS = 0.5
 """How long the loop sleeps without an event: messages go away and autosaves are made in between."""
 _WAITING_SECONDS = 0.05
-"""The same while an entry of the history waits for a rest."""
+"""How long it sleeps while an entry of the history waits for a rest."""
 
 
 class App:

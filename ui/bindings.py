@@ -20,7 +20,7 @@ SHIFT, CTRL, ALT = "shift", "ctrl", "alt"
 """The modifier keys, as `Binding.modifiers` names them."""
 
 
-class Action(Enum):
+class MouseAction(Enum):
     """What the mouse does in the picture."""
 
     ORBIT = "orbit"
@@ -48,7 +48,7 @@ class Binding:
 
     button: Button
     modifiers: frozenset[str]
-    action: Action
+    action: MouseAction
     description: str
 
     @property
@@ -57,52 +57,52 @@ class Binding:
         held = [name.capitalize() for name in (CTRL, ALT, SHIFT) if name in self.modifiers]
         gesture = {Button.WHEEL: "wheel", Button.GRAVE: "`"}.get(self.button)
         if gesture is None:
-            is_click = self.action in (Action.SELECT, Action.SELECT_MORE)
+            is_click = self.action in (MouseAction.SELECT, MouseAction.SELECT_MORE)
             gesture = f"{self.button.value} {'click' if is_click else 'drag'}"
         text = " + ".join([*held, gesture])
         return text[0].upper() + text[1:]
 
 
-def _binding(keys: str, action: Action, description: str) -> Binding:
+def _binding(keys: str, action: MouseAction, description: str) -> Binding:
     *modifiers, button = keys.split("+")
     return Binding(Button(button), frozenset(modifiers), action, description)
 
 
 CLICKS = (
-    _binding("left", Action.SELECT, "Select what is under the cursor; on nothing: deselect"),
-    _binding("right", Action.SELECT, "The same"),
-    _binding("ctrl+left", Action.SELECT_MORE, "Add it to the selection, or take it out"),
-    _binding("ctrl+right", Action.SELECT_MORE, "The same"),
+    _binding("left", MouseAction.SELECT, "Select what is under the cursor; on nothing: deselect"),
+    _binding("right", MouseAction.SELECT, "The same"),
+    _binding("ctrl+left", MouseAction.SELECT_MORE, "Add it to the selection, or take it out"),
+    _binding("ctrl+right", MouseAction.SELECT_MORE, "The same"),
 )
-"""In both sets."""
+"""What clicks do, in both sets."""
 
-_WHEEL = _binding("wheel", Action.ZOOM, "Zoom towards the cursor")
+_WHEEL = _binding("wheel", MouseAction.ZOOM, "Zoom towards the cursor")
 """What the wheel does in both sets."""
 
 NAVIGATION: dict[str, tuple[Binding, ...]] = {
     # A touchpad has no middle button: Alt with the left button stands in for it, as Blender's "Emulate 3
     # Button Mouse" has it.
     "blender": (
-        _binding("middle", Action.ORBIT, "Orbit around the target"),
-        _binding("shift+middle", Action.PAN, "Pan"),
-        _binding("ctrl+middle", Action.DOLLY, "Move nearer or farther"),
+        _binding("middle", MouseAction.ORBIT, "Orbit around the target"),
+        _binding("shift+middle", MouseAction.PAN, "Pan"),
+        _binding("ctrl+middle", MouseAction.DOLLY, "Move nearer or farther"),
         _WHEEL,
-        _binding("alt+left", Action.ORBIT, "Orbit, without a middle button"),
-        _binding("alt+shift+left", Action.PAN, "Pan, without a middle button"),
-        _binding("alt+ctrl+left", Action.DOLLY, "Move nearer or farther, without a middle button"),
-        _binding("shift+`", Action.FLY, "Fly until a click or Escape"),
+        _binding("alt+left", MouseAction.ORBIT, "Orbit, without a middle button"),
+        _binding("alt+shift+left", MouseAction.PAN, "Pan, without a middle button"),
+        _binding("alt+ctrl+left", MouseAction.DOLLY, "Move nearer or farther, without a middle button"),
+        _binding("shift+`", MouseAction.FLY, "Fly until a click or Escape"),
     ),
     # These are Maya's three moves with Alt, and the bare buttons of viewers such as Sketchfab and Unreal,
     # because many desktops keep Alt + left drag for themselves.
     "plain": (
-        _binding("left", Action.ORBIT, "Orbit around the target"),
-        _binding("middle", Action.PAN, "Pan"),
-        _binding("right", Action.FLY, "Look around, and fly while it is held"),
+        _binding("left", MouseAction.ORBIT, "Orbit around the target"),
+        _binding("middle", MouseAction.PAN, "Pan"),
+        _binding("right", MouseAction.FLY, "Look around, and fly while it is held"),
         _WHEEL,
-        _binding("shift+left", Action.PAN, "Pan"),
-        _binding("alt+left", Action.ORBIT, "Orbit, as in Maya"),
-        _binding("alt+middle", Action.PAN, "Pan, as in Maya"),
-        _binding("alt+right", Action.DOLLY, "Move nearer or farther, as in Maya"),
+        _binding("shift+left", MouseAction.PAN, "Pan"),
+        _binding("alt+left", MouseAction.ORBIT, "Orbit, as in Maya"),
+        _binding("alt+middle", MouseAction.PAN, "Pan, as in Maya"),
+        _binding("alt+right", MouseAction.DOLLY, "Move nearer or farther, as in Maya"),
     ),
 }
 """Drags, the wheel and keys, by name of the set (`preferences.NAVIGATIONS`)."""
@@ -129,15 +129,15 @@ FLY_KEYS = (
 )
 """The keys that fly, in both sets."""
 FLY_FAST = 4.0
-"""Of the speed while Shift is held."""
+"""How much faster the camera flies while Shift is held."""
 
 
-def action_for(navigation: str, button: Button, modifiers: Collection[str]) -> Action | None:
+def action_for(navigation: str, button: Button, modifiers: Collection[str]) -> MouseAction | None:
     """What a drag with a button, a turn of the wheel or a key does in a set; None: nothing."""
     return _found(NAVIGATION[navigation], button, modifiers)
 
 
-def click_action(button: Button, modifiers: Collection[str]) -> Action | None:
+def click_action(button: Button, modifiers: Collection[str]) -> MouseAction | None:
     """What a click does, in both sets; None: nothing."""
     return _found(CLICKS, button, modifiers)
 
@@ -154,7 +154,7 @@ def help_lines(navigation: str) -> list[tuple[str, str]]:
     return [*lines, ("Shift", f"Fly {FLY_FAST:g} times as fast")]
 
 
-def _found(bindings: tuple[Binding, ...], button: Button, modifiers: Collection[str]) -> Action | None:
+def _found(bindings: tuple[Binding, ...], button: Button, modifiers: Collection[str]) -> MouseAction | None:
     held = frozenset(modifiers)
     for binding in bindings:
         if binding.button is button and binding.modifiers == held:

@@ -9,7 +9,7 @@ from incpt.ui.rect import Rect
 _RIGHT_SHARE, _OUTLINER_SHARE = 0.25, 0.28
 """Width of the panels as a share of the window's, and height of the outliner as a share of theirs."""
 _LEAST_WIDTH = 310.0
-"""Of the panels on the right, in points: all tabs are to be seen."""
+"""Least width of the panels, in points at a scale of 1: every tab can be seen."""
 
 
 class Layout:

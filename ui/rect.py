@@ -57,5 +57,5 @@ class Rect(Generic[_N_co]):
         return 0 <= x < 1 and 0 <= y < 1
 
     def scaled(self, factor: float) -> Rect[float]:
-        """The same rectangle in a unit of which `factor` make one of today's: pixels from points, say."""
+        """The same rectangle in another unit, `factor` of which make one of this: pixels from points, say."""
         return Rect(self.left * factor, self.top * factor, self.width * factor, self.height * factor)

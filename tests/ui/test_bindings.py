@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from incpt.ui import bindings
-from incpt.ui.bindings import ALT, CTRL, NAVIGATION, SHIFT, Action, Button
+from incpt.ui.bindings import ALT, CTRL, NAVIGATION, SHIFT, Button, MouseAction
 from incpt.ui.preferences import NAVIGATIONS
 
 
@@ -13,7 +13,7 @@ def test_every_navigation_that_can_be_chosen_is_there_and_can_do_everything() ->
     assert set(NAVIGATION) == set(NAVIGATIONS)
     for table in NAVIGATION.values():
         assert {b.action for b in table} == {
-            Action.ORBIT, Action.PAN, Action.DOLLY, Action.ZOOM, Action.FLY
+            MouseAction.ORBIT, MouseAction.PAN, MouseAction.DOLLY, MouseAction.ZOOM, MouseAction.FLY
         }  # fmt: skip
 
 
@@ -27,31 +27,33 @@ def test_no_gesture_means_two_things(table: tuple[bindings.Binding, ...]) -> Non
 @pytest.mark.parametrize(
     ("navigation", "button", "modifiers", "action"),
     [
-        ("blender", Button.MIDDLE, (), Action.ORBIT),
-        ("blender", Button.MIDDLE, (SHIFT,), Action.PAN),
-        ("blender", Button.MIDDLE, [CTRL], Action.DOLLY),
-        ("blender", Button.LEFT, {ALT, SHIFT}, Action.PAN),
-        ("blender", Button.GRAVE, {SHIFT}, Action.FLY),
+        ("blender", Button.MIDDLE, (), MouseAction.ORBIT),
+        ("blender", Button.MIDDLE, (SHIFT,), MouseAction.PAN),
+        ("blender", Button.MIDDLE, [CTRL], MouseAction.DOLLY),
+        ("blender", Button.LEFT, {ALT, SHIFT}, MouseAction.PAN),
+        ("blender", Button.GRAVE, {SHIFT}, MouseAction.FLY),
         ("blender", Button.LEFT, (), None),
         ("blender", Button.RIGHT, (), None),
         ("blender", Button.MIDDLE, (SHIFT, CTRL), None),
-        ("plain", Button.LEFT, (), Action.ORBIT),
-        ("plain", Button.LEFT, (ALT,), Action.ORBIT),
-        ("plain", Button.MIDDLE, (ALT,), Action.PAN),
-        ("plain", Button.RIGHT, (ALT,), Action.DOLLY),
-        ("plain", Button.RIGHT, (), Action.FLY),
-        ("plain", Button.WHEEL, (), Action.ZOOM),
+        ("plain", Button.LEFT, (), MouseAction.ORBIT),
+        ("plain", Button.LEFT, (ALT,), MouseAction.ORBIT),
+        ("plain", Button.MIDDLE, (ALT,), MouseAction.PAN),
+        ("plain", Button.RIGHT, (ALT,), MouseAction.DOLLY),
+        ("plain", Button.RIGHT, (), MouseAction.FLY),
+        ("plain", Button.WHEEL, (), MouseAction.ZOOM),
         ("plain", Button.WHEEL, (CTRL,), None),
     ],
 )
-def test_drags(navigation: str, button: Button, modifiers: tuple[str, ...], action: Action | None) -> None:
+def test_drags(
+    navigation: str, button: Button, modifiers: tuple[str, ...], action: MouseAction | None
+) -> None:
     assert bindings.action_for(navigation, button, modifiers) is action
 
 
 def test_clicks_select_with_the_left_and_the_right_button() -> None:
     for button in (Button.LEFT, Button.RIGHT):
-        assert bindings.click_action(button, ()) is Action.SELECT
-        assert bindings.click_action(button, {CTRL}) is Action.SELECT_MORE
+        assert bindings.click_action(button, ()) is MouseAction.SELECT
+        assert bindings.click_action(button, {CTRL}) is MouseAction.SELECT_MORE
         assert bindings.click_action(button, {ALT}) is None
     assert bindings.click_action(Button.MIDDLE, ()) is None
 

@@ -176,7 +176,7 @@ COMMANDS: tuple[Command, ...] = (
             checked=lambda e: e.preferences.navigation == "plain"),
     Command("About incpt", "Help", _show_about, group=1),
 )  # fmt: skip
-"""In the order of the menus. Names are unique."""
+"""All commands, in the order of the menus. Their names are unique."""
 
 
 def command(name: str) -> Command:

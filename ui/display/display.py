@@ -13,7 +13,7 @@ from incpt.ui.display import shaders
 from incpt.ui.display.outline import Outline, Outlined
 from incpt.ui.display.overlays import Overlay
 from incpt.ui.display.projection import split_x, viewport_of, whole_pixels
-from incpt.ui.display.side import Side
+from incpt.ui.display.textures import PictureTextures
 from incpt.ui.preferences import DisplaySettings
 from incpt.ui.rect import Rect
 from incpt.viewer.viewer import Picture
@@ -40,7 +40,7 @@ class Display:
         self._programs = (self._tone_map, self._compose, self._bar, self._tile_luma)
         self._arrays = {p: context.vertex_array(p, []) for p in self._programs}
         self.outline = Outline(context)
-        self._sides: list[Side] = []
+        self._sides: list[PictureTextures] = []
         self._aovs: Aovs | None = None
         self.background = (0.11, 0.11, 0.115)
         """Colour of pixels that have no sample yet and nothing to show instead, sRGB."""
@@ -52,7 +52,7 @@ class Display:
         move, say) shows through where the new one has no sample yet, until it is complete.
         """
         while len(self._sides) < len(pictures):
-            self._sides.append(Side(self._context))
+            self._sides.append(PictureTextures(self._context))
         while len(self._sides) > len(pictures):
             self._sides.pop(0).release()
         for side, picture in zip(self._sides, pictures, strict=True):
@@ -119,7 +119,7 @@ class Display:
         for program in self._programs:
             program.release()
 
-    def _shown(self, area: Rect[int], bar_x: float | None) -> list[tuple[Side, Rect[int]]]:
+    def _shown(self, area: Rect[int], bar_x: float | None) -> list[tuple[PictureTextures, Rect[int]]]:
         """Which side is seen in which part of the area."""
         if bar_x is None:
             return [(self._sides[-1], area)]
@@ -128,7 +128,7 @@ class Display:
         right = Rect(cut, area.top, area.right - cut, area.height)
         return [(side, part) for side, part in zip(self._sides, (left, right), strict=True) if part.width > 0]
 
-    def _map(self, side: Side, settings: DisplaySettings) -> None:
+    def _map(self, side: PictureTextures, settings: DisplaySettings) -> None:
         wanted = (settings.exposure, settings.curve)
         if side.mapped_with == wanted:
             return
@@ -147,7 +147,7 @@ class Display:
         side.mapped_with = wanted
         side.tile_luma_of = None
 
-    def _measure_tiles(self, side: Side) -> None:
+    def _measure_tiles(self, side: PictureTextures) -> None:
         assert side.picture is not None and side.mapped is not None
         grid, limit = side.picture.grid, self._context.info["GL_MAX_TEXTURE_SIZE"]
         if side.tile_luma_of == grid or max(grid.columns, grid.rows) > limit:
@@ -162,7 +162,7 @@ class Display:
 
     def _draw_side(
         self,
-        side: Side,
+        side: PictureTextures,
         part: Rect[int],
         rect_px: Rect[float],
         settings: DisplaySettings,

@@ -123,8 +123,8 @@ class Outlined:
 
     @property
     def objects(self) -> tuple[Object, ...]:
-        """Those that are visible, the farthest first and the active one last: what comes later covers what
-        was before."""
+        """The objects that are visible, the farthest first and the active one last: what comes later covers
+        what was before."""
         found = [o for o in self.scene.objects if o.name in self.names and o.visible]
 
         def place(obj: Object) -> tuple[bool, float]:

@@ -88,7 +88,7 @@ class Document:
 
     @property
     def title(self) -> str:
-        """For the window's title: the name, and whether there is something to save."""
+        """What the window's title says: the name, and whether there is something to save."""
         return f"{self.name} (edited)" if self.is_dirty else self.name
 
     def save(self, path: str | os.PathLike[str]) -> Path:

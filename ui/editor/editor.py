@@ -123,7 +123,6 @@ class Editor:
         if self.document.history.before is not None:
             self._end_drag()
             self.document.history.cancel()
-            self.gesture = replace(self.gesture, rest_until=0.0)
         elif self.selection:
             self.select(Selection())
 

@@ -39,7 +39,7 @@ class Messages:
         self._messages = [m for m in self._messages if m is not message]
 
     def current(self) -> list[Message]:
-        """Those that are not over yet."""
+        """The messages that are shown still."""
         now = self._now()
         self._messages = [
             m for m in self._messages if m.level not in _SECONDS or now - m.at < _SECONDS[m.level]

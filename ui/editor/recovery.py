@@ -153,7 +153,8 @@ class Recovery:
 
 
 def recovery_folder() -> Path:
-    """Where recovery files are kept; it need not exist. In the folder INCPT_CONFIG_DIR where that is set."""
+    """Where recovery files are kept; it need not exist. It lies in the folder that
+    INCPT_CONFIG_DIR names, where that is set."""
     chosen = os.environ.get(CONFIG_DIR)
     base = Path(chosen) if chosen else Path(platformdirs.user_state_dir("incpt", appauthor=False))
     return base / "recovery"

@@ -12,7 +12,7 @@ from incpt.scene.camera import Camera
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
 from incpt.ui import bindings
-from incpt.ui.bindings import Action, Button
+from incpt.ui.bindings import Button, MouseAction
 from incpt.ui.display.projection import split_x
 from incpt.ui.editor.state import Tool
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
@@ -71,8 +71,8 @@ class _Press:
     button: int
     at: Point
     last: Point
-    action: Action | None
-    click: Action | None
+    action: MouseAction | None
+    click: MouseAction | None
     is_drag: bool = False
 
 
@@ -122,7 +122,7 @@ class Viewport:
     @property
     def is_flying(self) -> bool:
         """Whether the camera flies, so that frames are due without an event and letters are no commands."""
-        holds = self._press is not None and self._press.is_drag and self._press.action is Action.FLY
+        holds = self._press is not None and self._press.is_drag and self._press.action is MouseAction.FLY
         return self._flies_freely or holds
 
     def let_go(self) -> None:
@@ -183,7 +183,9 @@ class Viewport:
                 self._drags += 1
                 return
         if imgui.is_key_pressed(imgui.Key.grave_accent, False) and self._is_free(Button.GRAVE):
-            self._flies_freely = bindings.action_for(navigation, Button.GRAVE, _modifiers()) is Action.FLY
+            self._flies_freely = (
+                bindings.action_for(navigation, Button.GRAVE, _modifiers()) is MouseAction.FLY
+            )
             self._last_mouse = mouse
             self._drags += 1
 
@@ -193,7 +195,7 @@ class Viewport:
             press.is_drag = True
         if press.is_drag and press.action is not None:
             moved = _moved(outcome.scene.camera, press.action, press.last, mouse, picture.height)
-            if press.action is Action.FLY:
+            if press.action is MouseAction.FLY:
                 moved = _flown(moved, fly_speed)
             outcome = self._with_camera(outcome, moved, press.action)
         press.last = mouse
@@ -202,18 +204,18 @@ class Viewport:
         self._press = None
         if press.is_drag or press.click is None:
             return outcome
-        return _clicked(outcome, press.at, press.click is Action.SELECT_MORE, picture)
+        return _clicked(outcome, press.at, press.click is MouseAction.SELECT_MORE, picture)
 
     def _fly_freely(self, outcome: Outcome, speed: float, picture: Rect[float]) -> Outcome:
         mouse = _mouse()
-        moved = _moved(outcome.scene.camera, Action.FLY, self._last_mouse, mouse, picture.height)
+        moved = _moved(outcome.scene.camera, MouseAction.FLY, self._last_mouse, mouse, picture.height)
         self._last_mouse = mouse
         is_clicked = any(map(imgui.is_mouse_clicked, range(3)))
         if is_clicked or imgui.is_key_pressed(imgui.Key.escape, False):
             self._flies_freely = False
-        return self._with_camera(outcome, _flown(moved, speed), Action.FLY)
+        return self._with_camera(outcome, _flown(moved, speed), MouseAction.FLY)
 
-    def _with_camera(self, outcome: Outcome, camera: Camera, action: Action) -> Outcome:
+    def _with_camera(self, outcome: Outcome, camera: Camera, action: MouseAction) -> Outcome:
         if camera == outcome.scene.camera:
             return outcome
         scene = replace(outcome.scene, camera=camera)
@@ -223,7 +225,7 @@ class Viewport:
         turns = imgui.get_io().mouse_wheel
         if not turns or not self._is_free(Button.WHEEL):
             return outcome
-        if bindings.action_for(navigation, Button.WHEEL, _modifiers()) is not Action.ZOOM:
+        if bindings.action_for(navigation, Button.WHEEL, _modifiers()) is not MouseAction.ZOOM:
             return outcome
         x, y = _mouse()
         cursor = x - picture.left, y - picture.top
@@ -265,15 +267,15 @@ def _clicked(outcome: Outcome, at: Point, is_additive: bool, picture: Rect[float
     return outcome if is_additive else replace(outcome, selection=Selection())
 
 
-def _moved(camera: Camera, action: Action, last: Point, mouse: Point, height: float) -> Camera:
+def _moved(camera: Camera, action: MouseAction, last: Point, mouse: Point, height: float) -> Camera:
     dx, dy = mouse[0] - last[0], mouse[1] - last[1]
     if not (dx or dy):
         return camera
     moves = {
-        Action.ORBIT: camera_moves.orbit,
-        Action.PAN: camera_moves.pan,
-        Action.DOLLY: camera_moves.dolly,
-        Action.FLY: camera_moves.look,
+        MouseAction.ORBIT: camera_moves.orbit,
+        MouseAction.PAN: camera_moves.pan,
+        MouseAction.DOLLY: camera_moves.dolly,
+        MouseAction.FLY: camera_moves.look,
     }
     return moves[action](camera, dx, dy, height)
 

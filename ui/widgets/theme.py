@@ -14,15 +14,16 @@ Rgba = tuple[float, float, float, float]
 """sRGB with alpha, 0 to 1."""
 
 ACCENT: Rgba = (0.91, 0.49, 0.16, 1.0)
-"""Of the selection's outline too, so that a marked row and a marked object are seen to belong together."""
+"""The colour of what is marked; the outline of the selection has it too, so that a marked row and a marked
+object are seen to belong together."""
 TEXT: Rgba = (0.88, 0.88, 0.88, 1.0)
-"""Of ordinary text."""
+"""The colour of ordinary text."""
 QUIET: Rgba = (0.60, 0.60, 0.60, 1.0)
-"""Of text that stays in the background."""
+"""The colour of text that stays in the background."""
 WARNING: Rgba = (0.98, 0.75, 0.25, 1.0)
-"""Of what was refused or lost."""
+"""The colour of what was refused or lost."""
 ERROR: Rgba = (1.00, 0.45, 0.40, 1.0)
-"""Of what failed."""
+"""The colour of what failed."""
 
 _COLORS: dict[str, Rgba] = {
     "text": TEXT,

@@ -15,7 +15,7 @@ from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
 from incpt.scene.shapes import SHAPES
 from incpt.ui import bindings
-from incpt.ui.bindings import Action, Button
+from incpt.ui.bindings import Button, MouseAction
 from incpt.ui.commands import command as command_module
 from incpt.ui.commands import menus
 from incpt.ui.commands.command import Command, run
@@ -327,4 +327,4 @@ def test_fly_keys_are_no_commands_while_flying(user: Desk) -> None:
     user.key("Escape")
     assert not user.editor.gesture.is_flying and user.undo_count == 1
     assert {key.key.upper() for key in bindings.FLY_KEYS} & {one.keys for one in COMMANDS}  # they would clash
-    assert bindings.action_for("blender", Button.GRAVE, ["shift"]) is Action.FLY
+    assert bindings.action_for("blender", Button.GRAVE, ["shift"]) is MouseAction.FLY

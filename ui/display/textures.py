@@ -1,4 +1,4 @@
-"""One picture on the GPU: the display has one of these, and a split view two."""
+"""The textures of one picture on the GPU."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from incpt.ui.display.overlays import Overlay
 from incpt.viewer.viewer import Picture
 
 
-class Side:
-    """One picture on the GPU: its radiance, what shows through where it has none yet, and the result of tone
-    mapping at its own size."""
+class PictureTextures:
+    """One picture on the GPU: its radiance, what shows through where it has none yet, the result of tone
+    mapping at its own size, and its overlay. A split view has two of these."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context
