@@ -24,7 +24,7 @@ from incpt.viewer.threaded import ThreadedRenderer
 from incpt.viewer.viewer import Frame
 
 _IDLE_SECONDS = 0.5
-"""How long the loop sleeps without an event: messages go away and autosaves are made in between."""
+"""How long the loop sleeps without an event: notices go away and autosaves are made in between."""
 _WAITING_SECONDS = 0.05
 """How long it sleeps while an entry of the history waits for a rest."""
 
@@ -52,7 +52,7 @@ class App:
         self.viewport = Viewport()
         self.recovery = recovery.Recovery(kept.autosave_seconds)
         for complaint in complaints:
-            self.editor.messages.add(complaint, "warning")
+            self.editor.say(complaint, "warning")
         self._area: Rect[float] = Rect(0.0, 0.0, 1.0, 1.0)
         self.shown_frame: Frame | None = None
         self._kept = kept
@@ -76,7 +76,7 @@ class App:
             # A picture moves no widget, so one frame is enough to show it.
             if not all(isinstance(message, Frame) for message in received):
                 self.window.redraw()
-        if is_due or editor.is_waiting or self._has_message_ended():
+        if is_due or editor.is_waiting or self._has_notice_ended():
             self.frame()
         self._autosave()
 
@@ -127,8 +127,8 @@ class App:
         size = self.window.framebuffer_size
         draw_picture(self.editor, self.display, self._area, size, pixels)
 
-    def _has_message_ended(self) -> bool:
-        end = self.editor.messages.next_end
+    def _has_notice_ended(self) -> bool:
+        end = self.editor.notices.next_end
         return end is not None and self.editor.now() >= end
 
     def _keep_preferences(self) -> None:
@@ -137,7 +137,7 @@ class App:
             try:
                 preferences.save(self._kept)
             except OutputError as error:
-                self.editor.messages.add(str(error), "warning")
+                self.editor.say(str(error), "warning")
 
     def _autosave(self) -> None:
         self.editor.attempt(lambda: self.recovery.update(self.editor.document, self.editor.now()))

@@ -185,9 +185,10 @@ class Workspace:
 
 
 def _draw_notices(editor: Editor, area: Rect[float]) -> None:
-    dismissed = notices.draw_messages(editor.messages.current(), area)
+    editor.notices = editor.notices.current(editor.now())
+    dismissed = notices.draw_notices(editor.notices.said, area)
     if dismissed is not None:
-        editor.messages.dismiss(dismissed)
+        editor.notices = editor.notices.without(dismissed)
     building = editor.rendering.building
     if building is not None and not editor.rendering.has_failed:
         notices.draw_building(building.done, building.total, area)
@@ -208,7 +209,7 @@ def _key() -> str:
 def _tell(editor: Editor, refusals: Refusals) -> None:
     # A refusal is no line in the panel: it lasts for one frame only, and the panel may be scrolled.
     for message in refusals.messages:
-        editor.messages.add(message, "warning")
+        editor.say(message, "warning")
 
 
 def _with_object(scene: Scene, name: str, new: Object) -> Scene:

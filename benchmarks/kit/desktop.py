@@ -216,9 +216,9 @@ class Hand:
 
     def _state(self) -> str:
         editor = self.app.editor
-        messages = [message.text for message in editor.messages.current()]
+        notices = [notice.text for notice in editor.notices.said]
         mode = editor.frame.pictures[-1].mode if editor.frame is not None else None
-        return f"mode {mode}, selection {editor.selection.names}, messages {messages}"
+        return f"mode {mode}, selection {editor.selection.names}, notices {notices}"
 
 
 class _ClientMessage(ctypes.Structure):

@@ -107,7 +107,7 @@ class Soak:
         if editor.scene != self.model.scene:
             raise SoakError(f"not what the model has: {_difference(editor.scene, self.model.scene)}")
         if editor.rendering.has_failed:
-            raise SoakError(f"rendering stopped: {[m.text for m in editor.messages.current()]}")
+            raise SoakError(f"rendering stopped: {[one.text for one in editor.notices.said]}")
         if not editor.control.paused:
             self.hand.pump(self._is_shown, frames=0, timeout=60)
 

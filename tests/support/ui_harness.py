@@ -239,8 +239,8 @@ class Desk:
         self.click(f"{name}: {text}")
 
     def texts(self) -> list[str]:
-        """The messages that are shown."""
-        return [message.text for message in self.editor.messages.current()]
+        """The notices that are shown."""
+        return [notice.text for notice in self.editor.notices.said]
 
     @property
     def undo_count(self) -> int:
@@ -319,7 +319,7 @@ def state(editor: Editor) -> dict[str, Any]:
         "is_pinned": editor.rendering.is_pinned,
         "dialog": editor.dialog,
         "is_closing": editor.screen.is_closing,
-        "messages": tuple(message.text for message in editor.messages.current()),
+        "notices": tuple(notice.text for notice in editor.notices.said),
     }
 
 

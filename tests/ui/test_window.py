@@ -159,7 +159,7 @@ def test_the_gizmo_moves_the_object_and_the_exported_picture_shows_it_there(
     picture = tmp_path / "moved.exr"
     hand.key("ctrl+e")
     answer_path(hand, picture)
-    hand.pump(lambda: any(m.level == "done" for m in editor.messages.current()), timeout=60)
+    hand.pump(lambda: any(one.level == "done" for one in editor.notices.said), timeout=60)
     channels = read_exr(picture)
     rows, columns = np.nonzero(channels["object_id"] == 1)
     width, height = window.PICTURE_SIZE

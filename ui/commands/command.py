@@ -39,6 +39,6 @@ class Command:
 
 
 def run(editor: Editor, one: Command) -> None:
-    """Do what a command says, where it is enabled; what it refuses becomes a message."""
+    """Do what a command says, where it is enabled; what it refuses becomes a notice."""
     if one.is_enabled(editor):
         editor.attempt(lambda: one.action(editor))

@@ -66,7 +66,7 @@ def save_to(editor: Editor, path: Path) -> None:
     """Write the scene file there, and say so."""
     written = editor.document.save(path)
     editor.preferences = editor.preferences.with_recent(written)
-    editor.messages.add(f"{written} is saved", "done")
+    editor.say(f"{written} is saved", "done")
 
 
 def import_mesh(editor: Editor) -> None:
@@ -91,7 +91,7 @@ def drop(editor: Editor, path: Path) -> None:
     with collected_warnings() as warnings:
         scene, names = insert.drop_file(editor.scene, path)
     for warning in warnings:
-        editor.messages.add(warning, "warning")
+        editor.say(warning, "warning")
     selection = Selection(names) if names else editor.selection
     editor.propose(scene, f"Add {path.name}", selection=selection)
 

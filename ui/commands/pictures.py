@@ -37,4 +37,4 @@ def copy_picture(editor: Editor) -> None:
     display = editor.preferences.display
     linear = editor.frame.pictures[-1].image[..., :3]
     clipboard.copy_picture(tone_mapping.tone_map(linear, display.exposure, display.curve))
-    editor.messages.add("the picture is on the clipboard", "done")
+    editor.say("the picture is on the clipboard", "done")

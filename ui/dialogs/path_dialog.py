@@ -63,7 +63,7 @@ class PathDialog:
         modal.end()
         if chosen is None:
             return None
-        # A path that is refused is asked for again; the message says why.
+        # A path that is refused is asked for again; a notice says why.
         self._wants_focus = True
         return Answer() if chosen == 1 else Answer(self._take, again=self)
 

@@ -1,1 +1,1 @@
-"""The editor's state: the document under edit, preferences, recovery, messages."""
+"""The editor's state: the document under edit, preferences, recovery, notices."""

@@ -25,7 +25,7 @@ class Answer:
 
     action   what was chosen; by default nothing. A dialog that it returns is asked next.
     again    the dialog that is asked again where `action` is refused, unless that asked something itself.
-    explain  takes the reason of a refusal; by default the reason becomes a message.
+    explain  takes the reason of a refusal; by default the reason becomes a notice.
     """
 
     action: Callable[[], Dialog | None] = _nothing

@@ -19,7 +19,7 @@ from incpt.scene.selection import Selection
 from incpt.ui.display.overlays import NEEDS_AOVS
 from incpt.ui.editor.dialog import Answer, Dialog
 from incpt.ui.editor.document import Document
-from incpt.ui.editor.messages import Messages
+from incpt.ui.editor.notices import Notices
 from incpt.ui.editor.state import Control, Gesture, Rendering, Screen, Tool
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
 from incpt.viewer.threaded import Exported, Message, Pick, Picked, Problem, Renderer, Restart
@@ -29,7 +29,7 @@ OpenRenderer = Callable[[str | None], Renderer]
 """Opens a renderer on a device, given by name or None for the default."""
 
 _REFUSALS = (InputError, OutputError, DeviceError)
-"""What an action raises where it refuses: these become messages, anything else is a fault of the program."""
+"""What an action raises where it refuses: these become notices, anything else is a fault of the program."""
 
 
 class Editor:
@@ -54,7 +54,7 @@ class Editor:
         self.rendering = Rendering()
         self.gesture = Gesture()
         self.screen = Screen()
-        self.messages = Messages(now)
+        self.notices = Notices()
         self.dialog: Dialog | None = None
 
     # ---------------------------------------------------------------------------------- the scene
@@ -85,11 +85,11 @@ class Editor:
         self.gesture = replace(self.gesture, rest_until=self.now() + rest_seconds)
 
     def attempt(self, action: Callable[[], object]) -> bool:
-        """Run `action`; what it refuses becomes a message, and everything stays as it was."""
+        """Run `action`; what it refuses becomes a notice, and everything stays as it was."""
         try:
             action()
         except _REFUSALS as error:
-            self.messages.add(one_line(str(error)), "error")
+            self.say(one_line(str(error)), "error")
             return False
         return True
 
@@ -101,12 +101,16 @@ class Editor:
         except _REFUSALS as error:
             reason = one_line(str(error))
             if answer.explain is None:
-                self.messages.add(reason, "error")
+                self.say(reason, "error")
             else:
                 answer.explain(reason)
             following = answer.again
         if self.dialog is None:
             self.dialog = following
+
+    def say(self, text: str, level: str) -> None:
+        """Show a notice; `level` is one of notices.LEVELS."""
+        self.notices = self.notices.with_notice(text, level, self.now())
 
     def undo(self) -> None:
         """Take back the last edit; a drag under way is given up."""
@@ -213,9 +217,9 @@ class Editor:
                 case Picked():
                     self.select(self.selection.clicked(message.name, message.additive))
                 case Exported():
-                    self.messages.add(f"{message.path} is written", "done")
+                    self.say(f"{message.path} is written", "done")
                 case Problem():
-                    self.messages.add(message.text, "error")
+                    self.say(message.text, "error")
         return messages
 
     def settle(self, is_held: bool, is_flying: bool = False) -> None:
@@ -241,7 +245,7 @@ class Editor:
         self.select(Selection())
         self.control = replace(self.control, point=None)
         for warning in document.warnings:
-            self.messages.add(warning, "warning")
+            self.say(warning, "warning")
         if opened is not None:
             self.preferences = self.preferences.with_recent(opened)
 

@@ -1,4 +1,4 @@
-"""What the editor says: the bar at the bottom, messages over the picture, the building of kernels."""
+"""What the editor says: the bar at the bottom, notices over the picture, the building of kernels."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from imgui_bundle import imgui
 
 from incpt.scene.selection import Selection
-from incpt.ui.editor.messages import Message
+from incpt.ui.editor.notices import Notice
 from incpt.ui.panels.render import MODE_TEXTS
 from incpt.ui.rect import Rect
 from incpt.ui.widgets import places, theme
 from incpt.viewer.viewer import Frame
 
 _COLORS = {"done": theme.QUIET, "warning": theme.WARNING, "error": theme.ERROR}
-"""Colours of messages, by level."""
+"""Colours of notices, by level."""
 _FLOATING = (
     imgui.WindowFlags_.no_decoration
     | imgui.WindowFlags_.no_docking
@@ -59,9 +59,9 @@ def status_text(frame: Frame | None, is_paused: bool, selection: Selection) -> s
     return "   |   ".join(parts)
 
 
-def draw_messages(messages: Sequence[Message], picture: Rect[float]) -> Message | None:
-    """Messages, at the top left of the picture, below one another; returns the one that was dismissed."""
-    if not messages:
+def draw_notices(notices: Sequence[Notice], picture: Rect[float]) -> Notice | None:
+    """Notices, at the top left of the picture, below one another; returns the one that was dismissed."""
+    if not notices:
         return None
     line = imgui.get_text_line_height()
     imgui.set_next_window_pos(imgui.ImVec2(picture.left + line * 0.6, picture.top + line * 0.6))
@@ -69,15 +69,15 @@ def draw_messages(messages: Sequence[Message], picture: Rect[float]) -> Message 
     imgui.set_next_window_size_constraints(imgui.ImVec2(0, 0), limit)
     imgui.set_next_window_bg_alpha(0.9)
     dismissed = None
-    if imgui.begin("##messages", None, _FLOATING)[0]:
+    if imgui.begin("##notices", None, _FLOATING)[0]:
         imgui.push_text_wrap_pos(max(picture.width - 6 * line, 100.0))
-        for i, message in enumerate(messages):
+        for i, notice in enumerate(notices):
             imgui.push_id(i)
             if imgui.small_button("×"):
-                dismissed = message
+                dismissed = notice
             places.note(f"dismiss {i}")
             imgui.same_line()
-            imgui.text_colored(imgui.ImVec4(*_COLORS[message.level]), message.text)
+            imgui.text_colored(imgui.ImVec4(*_COLORS[notice.level]), notice.text)
             imgui.pop_id()
         imgui.pop_text_wrap_pos()
     imgui.end()

@@ -111,7 +111,7 @@ def test_a_path_that_is_refused_is_asked_for_again(
     user.key("Ctrl+O")
     before = state(user.editor)
     answer(user, typed)
-    assert changes(before, state(user.editor)) == {"messages"} and len(user.texts()) == 1
+    assert changes(before, state(user.editor)) == {"notices"} and len(user.texts()) == 1
     assert isinstance(user.editor.dialog, PathDialog)
     answer(user, str(other))
     assert user.editor.dialog is None and user.scene == OTHER
@@ -387,7 +387,7 @@ def test_what_cannot_be_used_is_a_message(user: Desk, tmp_path: Path, name: str)
     before, views = state(user.editor), len(user.null.views)
     assert not user.editor.attempt(lambda: files.drop(user.editor, path))
     user.frames(2)
-    assert changes(before, state(user.editor)) == {"messages"} and name in user.texts()[0]
+    assert changes(before, state(user.editor)) == {"notices"} and name in user.texts()[0]
     assert all(view.scene is SCENE for view in user.null.views[views:]) and user.undo_count == 0
 
 

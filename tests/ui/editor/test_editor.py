@@ -19,7 +19,6 @@ from incpt.scene import edits
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
 from incpt.ui.commands import command, materials, objects, pictures, table
-from incpt.ui.editor.messages import Messages
 from incpt.ui.panels.notices import status_text
 from incpt.ui.preferences import DisplaySettings, Preferences
 from incpt.viewer.threaded import Building, Export, Exported, Pin, Problem
@@ -124,7 +123,7 @@ def test_a_problem_is_a_message_and_nothing_else(user: Desk) -> None:
     tell(user, frame_of(user.editor.view))
     before, frame = state(user.editor), user.editor.frame
     tell(user, Problem("memory ran out; use a smaller image"))
-    assert changes(before, state(user.editor)) == {"messages"} and user.editor.frame is frame
+    assert changes(before, state(user.editor)) == {"notices"} and user.editor.frame is frame
     assert user.texts() == ["memory ran out; use a smaller image"]
     user.rest(1000.0)
     assert len(user.texts()) == 1  # an error stays until it is dismissed
@@ -139,6 +138,8 @@ def test_after_a_fatal_problem_the_scene_is_still_edited_and_restart_opens_the_d
         and not user.shows("building")
         and user.texts() == ["the device is gone"]
     )
+    tell(user, Problem("the picture is not written"))
+    assert user.editor.rendering.has_failed
     user.run("Cube")
     assert user.undo_count == 1 and user.devices == [None]
     user.run("Restart")
@@ -154,9 +155,9 @@ def test_another_device_is_opened(user: Desk) -> None:
 
 def test_what_was_exported_is_said_for_a_while(user: Desk, tmp_path: Path) -> None:
     tell(user, Exported(tmp_path))
-    assert user.texts() == [f"{tmp_path} is written"] and user.editor.messages.next_end is not None
+    assert user.texts() == [f"{tmp_path} is written"] and user.editor.notices.next_end is not None
     user.rest(6.0)
-    assert user.texts() == [] and user.editor.messages.next_end is None
+    assert user.texts() == [] and user.editor.notices.next_end is None
 
 
 def test_pinning_and_exporting_ask_the_renderer(user: Desk, tmp_path: Path) -> None:
@@ -201,19 +202,6 @@ def test_every_panel_shows_a_frame_of_either_kind(user: Desk) -> None:
     assert user.shows("mode") and user.shows("queue") and user.scene is SCENE
 
 
-def test_messages_are_said_once_and_the_oldest_go() -> None:
-    now = [0.0]
-    messages = Messages(lambda: now[0])
-    for text in ("a", "b", "a"):
-        messages.add(text, "error")
-    assert [m.text for m in messages.current()] == ["b", "a"]
-    for i in range(10):
-        messages.add(str(i), "warning")
-    assert len(messages.current()) == 6 and messages.next_end == 15.0
-    now[0] = 16.0
-    assert messages.current() == []
-
-
 def test_what_is_refused_leaves_everything(user: Desk) -> None:
     before = state(user.editor)
     for error in (InputError("a\nb"), DeviceError("c")):
@@ -222,7 +210,7 @@ def test_what_is_refused_leaves_everything(user: Desk) -> None:
             raise error
 
         assert not user.editor.attempt(fail)
-    assert changes(before, state(user.editor)) == {"messages"} and user.texts() == ["a b", "c"]
+    assert changes(before, state(user.editor)) == {"notices"} and user.texts() == ["a b", "c"]
     with pytest.raises(ZeroDivisionError):
         user.editor.attempt(lambda: 1 / 0)
 

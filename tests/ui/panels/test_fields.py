@@ -115,7 +115,7 @@ BUTTONS = [
     ("Object", "Rotation", {f"{CUBE}.rotation.1"}),
     ("Object", "Scale", {f"scene.objects.floor.scale.{i}" for i in (0, 2)}),
     ("Object", "Rename…##material", {"dialog"}),
-    ("Object", "Delete##material", {"messages"}),
+    ("Object", "Delete##material", {"notices"}),
     ("Scene", "Remove##image", {"scene.environment.image"}),
     ("Scene", "Choose…##image", {"dialog"}),
     ("Render", "Pause", {"control.paused"}),
@@ -238,7 +238,7 @@ def test_what_is_no_number_changes_nothing(user: Desk, field: Field, typed: str)
     before = state(user.editor)
     user.type(field.label, typed, across=field.across)
     is_remarked = typed in ("nan", "inf", "-inf") and not isinstance(before[field.place], int)
-    assert changes(before, state(user.editor)) == ({"messages"} if is_remarked else set())
+    assert changes(before, state(user.editor)) == ({"notices"} if is_remarked else set())
     assert user.undo_count == 0
 
 
@@ -254,8 +254,8 @@ def test_a_number_out_of_range_is_refused_with_a_remark(user: Desk, field: Field
     before = state(user.editor)
     user.type(field.label, typed, across=field.across)
     after = state(user.editor)
-    assert changes(before, after) == {"messages"} and user.undo_count == 0
-    (remark,) = after["messages"]
+    assert changes(before, after) == {"notices"} and user.undo_count == 0
+    (remark,) = after["notices"]
     assert (
         field.place.split(".")[3 if "objects" in field.place or "materials" in field.place else 2] in remark
     )
@@ -272,7 +272,7 @@ def test_just_outside_is_outside(user: Desk, label: str, typed: str) -> None:
     turn_to(user, "Object")
     before = state(user.editor)
     user.type(label, typed)
-    assert changes(before, state(user.editor)) == {"messages"}
+    assert changes(before, state(user.editor)) == {"notices"}
 
 
 @pytest.mark.parametrize("typed", ["1e999", "-1e999", "99999999999", "-99999999999"])
@@ -286,7 +286,7 @@ def test_settings_stay_in_their_range(user: Desk, field: Field, typed: str) -> N
         # Brought into its range: scene and preferences refuse to be made with another value.
         assert changed <= {field.place}
     else:
-        assert changed == {"messages"}
+        assert changed == {"notices"}
 
 
 @pytest.mark.parametrize(("panel", "label", "text", "value", "place"), CHOICES)
