@@ -72,12 +72,13 @@ class Desk:
     def frame(self, seconds: float = SECONDS_PER_FRAME) -> None:
         """What `App.frame` does, without a window."""
         self.editor.receive()
-        self._begin(seconds)
+        self.begin(seconds)
         self.area = take_frame(self.editor, self.workspace, self.viewport)
-        self._end()
+        self.end()
         self.on_frame()
 
-    def _begin(self, seconds: float = SECONDS_PER_FRAME) -> None:
+    def begin(self, seconds: float = SECONDS_PER_FRAME) -> None:
+        """Begin a frame of imgui."""
         self.seconds += seconds
         io = imgui.get_io()
         io.display_size = imgui.ImVec2(*WINDOW)
@@ -85,7 +86,8 @@ class Desk:
         imgui.new_frame()
 
     @staticmethod
-    def _end() -> None:
+    def end() -> None:
+        """End the frame that `begin` began."""
         imgui.render()
         acknowledge_textures()
 
@@ -221,10 +223,10 @@ class Desk:
 
     def panel(self, name: str) -> None:
         """Bring a tab to the front."""
-        self._begin()
+        self.begin()
         self.workspace.draw(self.editor)
         imgui.set_window_focus(name)
-        self._end()
+        self.end()
         self.frames(2)
 
     def run(self, name: str) -> None:

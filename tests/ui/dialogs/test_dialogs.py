@@ -474,8 +474,8 @@ def test_a_recovery_file_that_is_broken_stays_and_is_a_message(user: Desk, crash
 class Native:
     """The system's dialog, answered after some frames."""
 
-    def __init__(self, answer: object) -> None:
-        self.answer, self.frames_left = answer, 3
+    def __init__(self, answer: object, frames: int = 3) -> None:
+        self.answer, self.frames_left = answer, frames
 
     def ready(self, _timeout: int) -> bool:
         self.frames_left -= 1
@@ -499,3 +499,16 @@ def test_the_systems_own_dialog_is_used_where_there_is_one(
     user.key("Ctrl+O")
     user.frames(5)
     assert user.editor.dialog is None and user.scene == OTHER
+
+
+def test_the_picture_takes_no_click_while_the_systems_dialog_is_open(
+    user: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(native, "is_there", lambda: True)
+    monkeypatch.setattr(native.portable_file_dialogs, "open_file", lambda *_: Native("", frames=100))
+    user.key("Ctrl+O")
+    user.click_at(*user.at_picture(0.5, 0.5))
+    assert user.editor.dialog is not None and not user.null.requests
+    user.frames(100)
+    user.click_at(*user.at_picture(0.5, 0.5))
+    assert user.editor.dialog is None and len(user.null.requests) == 1

@@ -12,6 +12,7 @@ from support.ui_harness import Desk, changes, desk, flat, state, tell
 
 from incpt.scene.selection import Selection
 from incpt.ui.preferences import SnapSettings
+from incpt.ui.viewport.viewport import Outcome
 from incpt.viewer.threaded import Pick, Picked
 
 SCENE = mixed_scene(size=(48, 32))
@@ -251,3 +252,15 @@ def test_hidden_objects_have_no_gizmo(user: Desk) -> None:
     user.editor.select(Selection(("red cube",)))
     user.run("Hide")
     assert not user.shows("gizmo")
+
+
+def test_a_hand_that_rests_changes_nothing(user: Desk) -> None:
+    user.editor.select(Selection(("red cube",)))
+    user.frames(2)
+    user.begin()
+    editor = user.editor
+    outcome = user.viewport.update(
+        editor.scene, editor.selection, editor.tool, editor.preferences, user.picture
+    )
+    user.end()
+    assert outcome == Outcome(editor.scene, editor.selection, editor.preferences.display)
