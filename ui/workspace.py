@@ -18,6 +18,7 @@ from incpt.ui.panels import camera as camera_panel
 from incpt.ui.panels import display as display_panel
 from incpt.ui.panels import environment as environment_panel
 from incpt.ui.panels import material as material_panel
+from incpt.ui.panels import name as name_panel
 from incpt.ui.panels import notices, outliner, plots, render, tool, transform
 from incpt.ui.rect import Rect
 from incpt.ui.widgets import places, widgets
@@ -78,15 +79,12 @@ class Workspace:
     def _draw_object(self, editor: Editor) -> None:
         name = editor.selection.active
         if name is None:
-            widgets.note("Select an object: click it in the picture or in the outliner.")
+            name_panel.draw_hint()
             return
-        count = len(editor.selection.names)
-        new_name = widgets.text("Name", name)
+        new_name = name_panel.draw(name, len(editor.selection))
         if new_name is not None:
             editor.attempt(lambda: objects.rename_to(editor, name, new_name))
             return
-        if count > 1:
-            widgets.note(f"{count} objects are selected; the fields show this one.")
         refusals = Refusals()
         with widgets.section("Gizmo", is_open=False) as is_open:
             if is_open:
@@ -120,13 +118,12 @@ class Workspace:
         scene = editor.scene
         with widgets.section("Camera") as is_open:
             if is_open:
-                new = camera_panel.draw(scene.camera, refusals)
+                new, wanted = camera_panel.draw(scene.camera, refusals)
                 if new is not scene.camera:
                     editor.propose(replace(scene, camera=new), "Camera", _key())
-                if widgets.button("Frame selected##camera"):
+                if wanted.is_frame:
                     camera.frame_selected(editor)
-                widgets.same_line()
-                if widgets.button("Reset##camera"):
+                if wanted.is_reset:
                     camera.reset_camera(editor)
         scene = editor.scene
         with widgets.section("Environment") as is_open:
@@ -175,12 +172,8 @@ class Workspace:
             if is_open:
                 if editor.frame is not None:
                     self.records = self.records.with_frame(editor.frame, editor.now())
-                with widgets.row(
-                    "Reference", "Errors are measured against the picture as it was when pinned"
-                ):
-                    label = "Unpin" if editor.rendering.is_pinned else "Pin this picture"
-                    if widgets.button(label, enabled=editor.frame is not None):
-                        rendering.pin(editor)
+                if plots.draw_reference(editor.rendering.is_pinned, editor.frame is not None):
+                    rendering.pin(editor)
                 plots.draw(self.records, editor.preferences.step_ms)
 
 

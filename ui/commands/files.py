@@ -17,11 +17,11 @@ from incpt.ui.editor.document import Document, collected_warnings
 from incpt.ui.editor.editor import Editor
 from incpt.ui.editor.recovery import Recovery, find_left_behind
 
-SCENE_FILES: FileKind = ("Scenes", insert.SCENE_SUFFIXES)
+SCENE_FILES = FileKind("Scenes", insert.SCENE_SUFFIXES)
 """Files that hold a whole scene."""
-MESH_FILES: FileKind = ("Meshes", tuple(f".{name}" for name in mesh_files.mesh_suffixes()))
+MESH_FILES = FileKind("Meshes", tuple(f".{name}" for name in mesh_files.mesh_suffixes()))
 """Files that hold a mesh."""
-ENVIRONMENTS: FileKind = ("Environments", insert.ENVIRONMENT_SUFFIXES)
+ENVIRONMENTS = FileKind("Environments", insert.ENVIRONMENT_SUFFIXES)
 """Images that may surround the scene."""
 
 
@@ -32,7 +32,7 @@ def new(editor: Editor) -> None:
 
 def open_(editor: Editor) -> None:
     """Ask for a scene file or a mesh and open it."""
-    everything = ("Scenes and meshes", SCENE_FILES[1] + MESH_FILES[1])
+    everything = FileKind("Scenes and meshes", SCENE_FILES.suffixes + MESH_FILES.suffixes)
     _when_saved(
         editor, lambda: ask_path(editor, "Open", everything, False, lambda path: _open_now(editor, path))
     )

@@ -12,7 +12,7 @@ from incpt.ui.editor import clipboard
 from incpt.ui.editor.editor import Editor
 from incpt.viewer.threaded import Export
 
-PICTURES: FileKind = ("Pictures", (".png", ".exr"))
+PICTURES = FileKind("Pictures", (".png", ".exr"))
 """Files that the picture can be written to."""
 
 
@@ -25,7 +25,7 @@ def export_picture(editor: Editor) -> None:
 
 def export_to(editor: Editor, path: Path) -> None:
     """Write the picture: PNG as it is shown, EXR linear with the AOVs."""
-    if path.suffix.lower() not in PICTURES[1]:
+    if path.suffix.lower() not in PICTURES.suffixes:
         raise InputError(f"{path}: ends in no known format; use .exr or .png")
     display = editor.preferences.display
     editor.renderer.request(Export(path, aovs=True, exposure=display.exposure, curve=display.curve))

@@ -5,14 +5,19 @@ from __future__ import annotations
 import shutil
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 from imgui_bundle import portable_file_dialogs
 
 _PROGRAMS = ("zenity", "kdialog", "matedialog", "qarma")
 """Programs that show the dialog on Linux."""
 
-FileKind = tuple[str, tuple[str, ...]]
-"""A name for files, and the suffixes that they have, with their dot."""
+
+class FileKind(NamedTuple):
+    """Files that a dialog asks for: what they are called, and the suffixes that they have, with their dot."""
+
+    name: str
+    suffixes: tuple[str, ...]
 
 
 def is_there() -> bool:
@@ -25,7 +30,7 @@ class NativeDialog:
     """The system's dialog, from the moment when it is made until it is answered."""
 
     def __init__(self, title: str, kind: FileKind, is_saving: bool, folder: Path) -> None:
-        filters = [kind[0], " ".join(f"*{suffix}" for suffix in kind[1])]
+        filters = [kind.name, " ".join(f"*{suffix}" for suffix in kind.suffixes)]
         ask = portable_file_dialogs.save_file if is_saving else portable_file_dialogs.open_file
         self._asked = ask(title, f"{folder}/", filters)
 

@@ -74,8 +74,8 @@ class PathDialog:
         if not self.text.strip() or os.path.isdir(path):
             self.text = f"{path}/".replace("//", "/")
             raise InputError(f"{path}: is a folder; name a file in it")
-        if self.is_saving and not path.suffix and len(self.kind[1]) == 1:
-            path = path.with_name(path.name + self.kind[1][0])
+        if self.is_saving and not path.suffix and len(self.kind.suffixes) == 1:
+            path = path.with_name(path.name + self.kind.suffixes[0])
         if not (self.is_saving and os.path.exists(path)):
             self.then(path)
             return None
@@ -98,13 +98,13 @@ class PathDialog:
         except InputError:
             typed = Path(self.text)
         folder = typed if self.text.endswith("/") else typed.parent
-        imgui.text_disabled(f"{self.kind[0]} in {folder}")
+        imgui.text_disabled(f"{self.kind.name} in {folder}")
         size = imgui.ImVec2(0, imgui.get_text_line_height() * _LINES)
         if imgui.begin_child("files", size, imgui.ChildFlags_.borders):
             if imgui.selectable("../", False)[0]:
                 self.text = f"{folder.parent}/".replace("//", "/")
             places.note("../")
-            for name in _entries(folder, self.kind[1]):
+            for name in _entries(folder, self.kind.suffixes):
                 if imgui.selectable(name, name == typed.name)[0]:
                     self.text = str(folder / name) + ("/" if name.endswith("/") else "")
                 places.note(name)

@@ -6,7 +6,13 @@ import numpy as np
 from imgui_bundle import imgui, implot
 
 from incpt.ui.editor.records import Records, Series
-from incpt.ui.widgets import places
+from incpt.ui.widgets import places, widgets
+
+
+def draw_reference(is_pinned: bool, has_picture: bool) -> bool:
+    """The button that pins a picture, or lets go of it; returns whether it was pressed."""
+    with widgets.row("Reference", "Errors are measured against the picture as it was when pinned"):
+        return widgets.button("Unpin" if is_pinned else "Pin this picture", enabled=has_picture)
 
 
 def draw(records: Records, step_ms: float) -> None:

@@ -217,6 +217,20 @@ def test_a_file_is_replaced_only_when_told_so(user: Desk, other: Path) -> None:
     assert user.editor.document.path == other
 
 
+def test_where_replacing_fails_the_place_is_asked_for_again(
+    user: Desk, other: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise OutputError("the disk is full")
+
+    monkeypatch.setattr(scene_save, "save", fail)
+    user.key("Ctrl+Shift+S")
+    answer(user, "other")
+    choose(user, "Replace")
+    assert isinstance(user.editor.dialog, PathDialog) and user.texts() == ["the disk is full"]
+    assert registry.load(other) == OTHER
+
+
 @pytest.mark.parametrize("typed", ["a.json", "missing/a.toml", "a.ply"])
 def test_a_place_that_is_refused_is_asked_for_again(user: Desk, tmp_path: Path, typed: str) -> None:
     edit(user)
@@ -495,7 +509,7 @@ def test_the_systems_own_dialog_is_used_where_there_is_one(
     for _ in range(2):
         user.key("Ctrl+O")
         user.frames(5)
-        assert user.editor.dialog is None and user.scene is SCENE
+        assert user.editor.dialog is None and user.scene is SCENE and user.texts() == []
     user.key("Ctrl+O")
     user.frames(5)
     assert user.editor.dialog is None and user.scene == OTHER
