@@ -504,6 +504,14 @@ def test_a_number_that_no_widget_offers_stays(user: Desk) -> None:
     assert user.scene.settings == replace(settings, max_bounces=1)
 
 
+def test_a_resolution_that_a_percentage_would_round_stays(user: Desk) -> None:
+    scale = next(i / 1000 for i in range(50, 4000) if i / 1000 * 100 / 100 != i / 1000)
+    user.editor.preferences = replace(user.editor.preferences, resolution_scale=scale)
+    turn_to(user, "Render")
+    user.click("Pause")
+    assert user.editor.preferences.resolution_scale == scale and user.editor.control.paused
+
+
 def test_pinning_asks_the_renderer(user: Desk) -> None:
     turn_to(user, "Method")
     user.click("Pin this picture")
