@@ -48,9 +48,11 @@ def test_kernels_of_a_step_fit_into_it() -> None:
     session = Session(SCENES["cornell"].scene, settings=RenderSettings(size=(128, 96)), device=device)
     session.build()
     device.take_busy_seconds()
-    report = session.step()
-    busy = device.take_busy_seconds()
-    assert 0.2 * report.seconds < busy <= report.seconds
+    shares = []
+    for _ in range(20):  # another program may have the processor in the middle of a step
+        report = session.step()
+        shares.append(device.take_busy_seconds() / report.seconds)
+    assert max(shares) > 0.2 and all(0 < share <= 1 for share in shares)
     assert device.take_busy_seconds() == 0
 
 
