@@ -11,7 +11,7 @@ import numpy as np
 import typer
 from rich.table import Table
 
-from incpt.accel import bvh
+from incpt.accel import bvh, top_level
 from incpt.benchmarks.kit import environment, experiment, options
 from incpt.benchmarks.kit.experiment import Outcome, Task, Work
 from incpt.benchmarks.kit.fit import fitted
@@ -60,7 +60,7 @@ def tasks(device: Device, plan: Plan) -> list[Task]:
 def _warm_up(device: Device, work: Work) -> None:
     mesh = terrain(2_000)
     bvh.refit_mesh(device, bvh.build_mesh(device, mesh), mesh)
-    bvh.build_top(device, np.tile(mesh.bounds, (100, 1, 1)))
+    top_level.build_top(device, np.tile(mesh.bounds, (100, 1, 1)))
     work.check()
     work.timing_starts()
 
@@ -97,7 +97,7 @@ def _top(device: Device, count: int, work: Work) -> dict[str, Any]:
     bounds = np.array([obj.world_bounds for obj in crowd(count).objects[1:]])
     _warm_up(device, work)
     began = time.perf_counter()
-    tree = bvh.build_top(device, bounds)
+    tree = top_level.build_top(device, bounds)
     return {"ms": 1e3 * (time.perf_counter() - began), "count": count, "nodes": len(tree.nodes)}
 
 

@@ -1,9 +1,9 @@
-"""Bounding volume hierarchies: one per mesh, and one over the objects of a scene.
+"""Bounding volume hierarchies: how they are built and refitted.
 
-Layer L2, above `device`, because the builder is an OpenCL kernel (cl/build_bvh.cl): in numpy the binned
-surface area heuristic takes tens of seconds for a million triangles, on the device less than one. The
-host drives it level by level; it sums up how many children each level has, which keeps the tree
-deterministic and its levels contiguous, so that a refit goes through them backwards.
+The builder is an OpenCL kernel (cl/accel/build_bvh.cl): in numpy the binned surface area heuristic takes tens
+of seconds for a million triangles, on the device less than one. The host drives it level by level. It sums up
+how many children each level has, which keeps the tree deterministic and its levels contiguous, so that a
+refit goes through them backwards.
 
 Nodes are 8-wide (Wald, Benthin and Boulos 2008, "Getting Rid of Packets"), leaves are packs of up to
 eight triangles: box and triangle tests both fill a float8.
@@ -69,7 +69,7 @@ def build_triangles(device: Device, vertices: npt.NDArray[np.float32], faces: np
     device.launch(
         device.kernel("bound_faces", _FILE), count, np.uint32(count), face_buffer, vertex_buffer, boxes
     )
-    return _build(device, count, layout.BVH_WIDTH, boxes, face_buffer, vertex_buffer)
+    return build_boxes(device, count, layout.BVH_WIDTH, boxes, face_buffer, vertex_buffer)
 
 
 def refit_mesh(device: Device, bvh: Bvh, mesh: Mesh) -> Bvh:
@@ -90,53 +90,7 @@ def refit_mesh(device: Device, bvh: Bvh, mesh: Mesh) -> Bvh:
         device.launch(kernel, size, np.uint32(size), np.uint32(first), nodes, packs, faces, vertices)
     new_nodes = device.read(nodes, np.empty_like(bvh.nodes))
     new_packs = device.read(packs, np.empty_like(bvh.packs))
-    return Bvh(new_nodes, new_packs, bvh.levels, _root_bounds(new_nodes))
-
-
-def build_top(device: Device, bounds: npt.NDArray[np.floating[Any]]) -> Bvh:
-    """The tree over objects with world-space bounds (N, 2, 3); each leaf is one object.
-
-    Boxes are widened to the next float32 outwards, so that bounds may come in float64.
-    """
-    if len(bounds) == 0:
-        return _empty_tree()
-    boxes = np.zeros((len(bounds), 8), np.float32)
-    infinity = np.float32(np.inf)
-    boxes[:, 0:3] = np.nextafter(bounds[:, 0].astype(np.float32), -infinity)
-    boxes[:, 4:7] = -np.nextafter(bounds[:, 1].astype(np.float32), infinity)
-    boxes[:, 3] = np.arange(len(bounds), dtype=np.uint32).view(np.float32)
-    return _build(device, len(bounds), 1, device.upload(boxes))
-
-
-def build_top_with_triangles(
-    device: Device,
-    bounds: npt.NDArray[np.floating[Any]],
-    objects: npt.NDArray[np.integer[Any]],
-    triangles: Bvh | None,
-) -> npt.NDArray[np.void]:
-    """Nodes of the top level over `objects`, indices (N,) with world-space bounds (N, 2, 3), and over the
-    packs of `triangles`, a tree in world space, which becomes a branch of the top level."""
-    if triangles is None:
-        return _with_leaves(build_top(device, bounds), objects)
-    packs = _with_leaves(triangles, np.arange(len(triangles.packs)) | layout.NODE_PACK)
-    if len(objects) == 0:
-        return packs
-    both = np.concatenate([bounds, triangles.bounds[None]])
-    nodes = _with_leaves(build_top(device, both), np.append(objects, layout.NODE_PACK))
-    # The leaf that stands for all triangles becomes the root of their tree.
-    nodes["child"][nodes["child"] == layout.NODE_LEAF | layout.NODE_PACK] = len(nodes)
-    inner = packs["child"] < layout.NODE_PACK
-    packs["child"][inner] += np.uint32(len(nodes))
-    return np.concatenate([nodes, packs])
-
-
-def _with_leaves(tree: Bvh, references: npt.NDArray[np.integer[Any]]) -> npt.NDArray[np.void]:
-    """The nodes of a tree whose leaf i refers to references[i]."""
-    nodes = tree.nodes.copy()
-    child = nodes["child"]
-    leaves = (child >= layout.NODE_LEAF) & (child != layout.NODE_EMPTY)
-    child[leaves] = references[child[leaves] & ~np.uint32(layout.NODE_LEAF)] | layout.NODE_LEAF
-    return nodes
+    return Bvh(new_nodes, new_packs, bvh.levels, root_bounds(new_nodes))
 
 
 def position_error(
@@ -159,18 +113,14 @@ def position_error(
     return np.asarray(_HALF_ULP * error)
 
 
-def _empty_tree() -> Bvh:
-    nodes = np.zeros(1, layout.NODE)
-    nodes["bounds"][:, 0::2] = np.inf
-    nodes["bounds"][:, 1::2] = -np.inf
-    nodes["child"] = layout.NODE_EMPTY
-    return Bvh(nodes, np.empty(0, layout.TRIANGLE_PACK), (0, 1), _root_bounds(nodes))
-
-
-def _build(
+def build_boxes(
     device: Device, count: int, leaf_size: int, boxes: Any, faces: Any = None, vertices: Any = None
 ) -> Bvh:
-    # A top level has no faces: its kernel arguments are filled with any buffer and never read.
+    """The tree over `count` boxes in a buffer, laid out as Box of cl/accel/build_bvh.cl. A leaf is a pack of
+    up to `leaf_size` faces of the mesh in the buffers `faces` and `vertices`, or without these a single box,
+    whose number is the reference. Raises DeviceError where the device's memory runs out.
+    """
+    # Kernel arguments for a mesh that is not there are filled with any buffer and never read.
     mesh = (faces, vertices) if faces is not None else (boxes, boxes)
     splitter = _Splitter(device, boxes, leaf_size) if count > LARGEST_SERIAL_RANGE else None
     ranges = device.upload(np.array([0, count], np.uint32))
@@ -191,7 +141,7 @@ def _build(
         range_count = inner
         levels.append(node_count)
     all_nodes = np.concatenate(nodes)
-    return Bvh(all_nodes, np.concatenate(packs), tuple(levels), _root_bounds(all_nodes))
+    return Bvh(all_nodes, np.concatenate(packs), tuple(levels), root_bounds(all_nodes))
 
 
 class _Level:
@@ -275,7 +225,7 @@ class _Level:
 
 @dataclass(frozen=True)
 class _Part:
-    """A range of boxes; what surrounds them, and twice their centres, as a Box of cl/build_bvh.cl."""
+    """A range of boxes; what surrounds them, and twice their centres, as a Box of cl/accel/build_bvh.cl."""
 
     start: int
     count: int
@@ -380,6 +330,7 @@ def _cheapest_split(
     return (int(axis), int(position) + 1) if np.isfinite(cost[axis, position]) else None
 
 
-def _root_bounds(nodes: npt.NDArray[np.void]) -> npt.NDArray[np.float32]:
+def root_bounds(nodes: npt.NDArray[np.void]) -> npt.NDArray[np.float32]:
+    """(2, 3) least and greatest coordinates of what is in the root, the first of the nodes of a tree."""
     planes = nodes["bounds"][0]
     return np.stack([planes[0::2].min(axis=1), planes[1::2].max(axis=1)])

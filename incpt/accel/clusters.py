@@ -1,102 +1,103 @@
-"""What rays are swept over (cl/sweep.cl): the facets of a few objects in world space, in clusters with a box
-each, so that rays pass by those that they cannot meet."""
+"""What rays are tested against by brute force (cl/cpu/brute_force.cl): the quads of a few objects in world
+space. They stand in clusters with a box each, so that rays pass by those that they cannot meet."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from incpt.accel.quads import SIDES, Facets
+from incpt.accel.quads import SIDES, Quads
+from incpt.accel.top_level import PlacedMesh, WorldTriangles
 from incpt.core import layout
 from incpt.scene.mesh import Mesh
 
 MOST_CLUSTERS = 32
-"""The sweep keeps a bit for each."""
+"""The kernels keep a bit for each."""
 _MOST_PARTS, _MOST_FACES, _MOST_TESTS, _MOST_COST = 128, 1536, 256, 80
 """Above one of these a tree is quicker (measured), or the tables would take too long after each edit:
-objects, faces, what it takes to test all facets, and what a group of rays is expected to pay."""
+objects, faces, what it takes to test all quads, and what a group of rays is expected to pay."""
 
 _LEAST_HEIGHT = 2.0**-16
-"""Of a parallelepiped, relative to the largest coordinate: below it rounding errors come near to it."""
-_BOX_COST, _SOLID_COST = 0.4, 1.3
-"""Of testing a box and a parallelepiped, in tests of a facet (instructions counted)."""
+"""Below this height, relative to the largest coordinate, a parallelepiped is as thin as rounding errors."""
+_BOX_COST, _PARALLELEPIPED_COST = 0.4, 1.3
+"""What testing a box and a parallelepiped costs, in tests of a quad (instructions counted)."""
 _RAYS = 16
-"""That are tested together: they go into a box if one of them meets it."""
+"""How many are tested together; they go into a box if one of them meets it."""
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """What one object brings along: its facets, its index, and where its vertices and its faces begin."""
+class _Part:
+    """One object: its quads, its index, and where its vertices and faces begin among those of all parts."""
 
-    facets: Facets
+    quads: Quads
     index: int
     first_vertex: int
     first_face: int
 
 
 @dataclass(frozen=True, eq=False)
-class Tables:
-    """layout.FACET, layout.SOLID and layout.CLUSTER, as the sweep reads them."""
+class BruteForceTables:
+    """Rows of layout.FACET, layout.SOLID and layout.CLUSTER, as the kernels read them."""
 
-    facets: npt.NDArray[np.void]
-    solids: npt.NDArray[np.void]
+    quads: npt.NDArray[np.void]
+    parallelepipeds: npt.NDArray[np.void]
     clusters: npt.NDArray[np.void]
 
 
-def empty_tables() -> Tables:
+def empty_tables() -> BruteForceTables:
     """Those of no objects."""
-    return Tables(np.zeros(0, layout.FACET), np.zeros(0, layout.SOLID), np.zeros(1, layout.CLUSTER))
+    return BruteForceTables(np.zeros(0, layout.FACET), np.zeros(0, layout.SOLID), np.zeros(1, layout.CLUSTER))
 
 
-def may_be_few(meshes: Sequence[Mesh]) -> bool:
-    """Whether it is worth looking for the facets of these objects' meshes, for `arrange`."""
-    return 0 < len(meshes) <= _MOST_PARTS and sum(len(mesh.faces) for mesh in meshes) <= _MOST_FACES
+def arrange(triangles: WorldTriangles, quads_of: Callable[[Mesh], Quads]) -> BruteForceTables | None:
+    """The tables of these triangles, or None where rays are quicker by the way of their tree. `quads_of` is
+    asked for the quads of a mesh, see `quads.find_quads`, where brute force may be quicker.
 
-
-def arrange(
-    parts: Sequence[Part],
-    vertices: npt.NDArray[np.float32],
-    places: npt.NDArray[np.uint32],
-    flat: npt.NDArray[np.bool_],
-) -> Tables | None:
-    """The tables of all parts; None where rays are quicker by the way of a tree.
-
-    vertices  (V, 3) of all parts, in world space.
-    places    (N,) where the faces of all parts stand in the packs, as HIT_TRIANGLE has it.
-    flat      (8 * P,) whether a face without area is in that place of the packs, which no ray meets.
-
-    The box of the last cluster is not worth asking: nearly all rays would meet it. It may be empty.
+    The last cluster is tested without its box, since nearly all rays would meet that. It may be empty.
     """
-    rows, groups, sides = _rows(parts, vertices, places)
-    solids, thick = _solids(parts, vertices)
+    if not _may_pay(triangles.meshes):
+        return None
+    places = zip(triangles.meshes, triangles.first_vertices, triangles.first_faces, strict=True)
+    parts = [
+        _Part(quads_of(placed.mesh), placed.object_index, vertex, face) for placed, vertex, face in places
+    ]
+    vertices, without_area = triangles.vertices, triangles.without_area
+    rows, groups, sides = _rows(parts, vertices, triangles.places)
+    parallelepipeds, thick = _parallelepipeds(parts, vertices)
     # The sides of a parallelepiped that is too thin stand for themselves.
     sides[sides] = np.repeat(thick, SIDES)
-    solids = solids[thick]
-    kept = ~flat[rows["place"] & ~np.uint32(layout.NODE_PACK)].any(axis=1) | sides
+    parallelepipeds = parallelepipeds[thick]
+    kept = ~without_area[rows["place"] & ~np.uint32(layout.NODE_PACK)].any(axis=1) | sides
     rows, sides, group = rows[kept], sides[kept], np.unique(groups[kept], return_inverse=True)[1]
     if len(rows) == 0:
         return empty_tables()
-    if np.count_nonzero(~sides) + _SOLID_COST * len(solids) > _MOST_TESTS:
+    if np.count_nonzero(~sides) + _PARALLELEPIPED_COST * len(parallelepipeds) > _MOST_TESTS:
         return None
     boxes = _boxes(rows, group, sides)
     around = functools.reduce(_Box.joined, boxes).area
     clusters = _joined(boxes, around)
     if sum(cluster.cost(around) for cluster in clusters) > _MOST_COST:
         return None
-    return _tables(rows, solids, sides, group, [cluster for cluster in clusters if cluster.box_pays(around)])
+    boxed = [cluster for cluster in clusters if cluster.box_pays(around)]
+    return _tables(rows, parallelepipeds, sides, group, boxed)
+
+
+def _may_pay(meshes: Sequence[PlacedMesh]) -> bool:
+    """Whether brute force may be quicker, so that it is worth looking for quads."""
+    return len(meshes) <= _MOST_PARTS and sum(len(placed.mesh.faces) for placed in meshes) <= _MOST_FACES
 
 
 def _tables(
     rows: npt.NDArray[np.void],
-    solids: npt.NDArray[np.void],
+    parallelepipeds: npt.NDArray[np.void],
     sides: npt.NDArray[np.bool_],
     group: npt.NDArray[np.intp],
     clusters: Sequence[_Box],
-) -> Tables:
+) -> BruteForceTables:
     """Everything in the order of the clusters; what is in none of them is in the last."""
     number_of_group = np.full(int(group.max()) + 1, len(clusters))
     for i, cluster in enumerate(clusters):
@@ -116,45 +117,45 @@ def _tables(
     table["first_triangle"] = table["end"] - np.diff(ends(single), prepend=0)
     table["solid_end"] = ends(sides) // SIDES
     table["first_solid"][1:] = table["solid_end"][:-1]
-    solids = solids[np.argsort(number[sides][::SIDES], kind="stable")]
-    solids["first_side"] = np.count_nonzero(~sides) + SIDES * np.arange(len(solids))
-    return Tables(rows[order], solids, table)
+    parallelepipeds = parallelepipeds[np.argsort(number[sides][::SIDES], kind="stable")]
+    parallelepipeds["first_side"] = np.count_nonzero(~sides) + SIDES * np.arange(len(parallelepipeds))
+    return BruteForceTables(rows[order], parallelepipeds, table)
 
 
 def _rows(
-    parts: Sequence[Part], vertices: npt.NDArray[np.float32], places: npt.NDArray[np.uint32]
+    parts: Sequence[_Part], vertices: npt.NDArray[np.float32], places: npt.NDArray[np.uint32]
 ) -> tuple[npt.NDArray[np.void], npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
-    """All facets, the number of the group that each is in, and whether it is a side of a parallelepiped."""
-    own = [part.facets for part in parts]
-    counts = [len(facets.faces) for facets in own]
+    """All quads, the number of the group that each is in, and whether it is a side of a parallelepiped."""
+    own = [part.quads for part in parts]
+    counts = [len(quads.faces) for quads in own]
 
     def each(values: list[int]) -> npt.NDArray[np.intp]:
         return np.repeat(np.array(values, np.intp), counts)
 
-    turns = np.concatenate([facets.turns for facets in own])
-    along = np.concatenate([facets.along for facets in own])
+    turns = np.concatenate([quads.turns for quads in own])
+    along = np.concatenate([quads.along for quads in own])
     rows = np.zeros(sum(counts), layout.FACET)
     corners = (
-        np.concatenate([facets.corners for facets in own]) + each([p.first_vertex for p in parts])[:, None]
+        np.concatenate([quads.corners for quads in own]) + each([p.first_vertex for p in parts])[:, None]
     )
-    faces = np.concatenate([facets.faces for facets in own]) + each([p.first_face for p in parts])[:, None]
+    faces = np.concatenate([quads.faces for quads in own]) + each([p.first_face for p in parts])[:, None]
     rows["vertex"] = vertices[corners].reshape(-1, 12)
     rows["place"] = places[faces]
     rows["object"] = each([part.index for part in parts])
     rows["turns"] = turns[:, 0] | turns[:, 1] << np.uint32(2) | along << np.uint32(4)
     firsts = np.cumsum([0, *counts[:-1]])
     starts = np.zeros(len(rows), np.intp)
-    starts[[first + start for facets, first in zip(own, firsts, strict=True) for start in facets.groups]] = 1
-    sides = np.arange(len(rows)) - each(firsts.tolist()) >= each([facets.loose for facets in own])
+    starts[[first + start for quads, first in zip(own, firsts, strict=True) for start in quads.groups]] = 1
+    sides = np.arange(len(rows)) - each(firsts.tolist()) >= each([quads.loose for quads in own])
     return rows, np.cumsum(starts) - 1, sides
 
 
-def _solids(
-    parts: Sequence[Part], vertices: npt.NDArray[np.float32]
+def _parallelepipeds(
+    parts: Sequence[_Part], vertices: npt.NDArray[np.float32]
 ) -> tuple[npt.NDArray[np.void], npt.NDArray[np.bool_]]:
     """The parallelepipeds of all parts, and whether the distances of their sides are well above rounding
     errors."""
-    corners = vertices[np.concatenate([part.facets.solids + part.first_vertex for part in parts])]
+    corners = vertices[np.concatenate([part.quads.parallelepipeds + part.first_vertex for part in parts])]
     corners = corners.astype(np.float64)
     axes = corners[:, 1:] - corners[:, :1]
     regular = np.linalg.det(axes) != 0
@@ -168,7 +169,7 @@ def _solids(
 
 @dataclass(frozen=True)
 class _Box:
-    """Around the facets of some groups; what it takes to test them all."""
+    """A box around the quads of some groups; testing them all costs `inside` tests of a quad."""
 
     groups: tuple[int, ...]
     inside: float
@@ -177,7 +178,7 @@ class _Box:
 
     @property
     def area(self) -> float:
-        """Half of it."""
+        """Half of its surface."""
         x, y, z = (high - low for low, high in zip(self.least, self.greatest, strict=True))
         return x * y + y * z + z * x
 
@@ -194,7 +195,7 @@ class _Box:
         return self._cost_if_boxed(around) < self.inside
 
     def cost(self, around: float) -> float:
-        """What such rays pay for the facets, and for the box if it pays."""
+        """What such rays pay for the quads, and for the box if it pays."""
         return min(self._cost_if_boxed(around), self.inside)
 
     def _cost_if_boxed(self, around: float) -> float:
@@ -209,7 +210,7 @@ def _boxes(
     corners = rows["vertex"].reshape(-1, 4, 3)
     least = np.minimum.reduceat(corners.min(axis=1), starts).tolist()
     greatest = np.maximum.reduceat(corners.max(axis=1), starts).tolist()
-    inside = np.where(sides[starts], _SOLID_COST, np.bincount(group)).tolist()
+    inside = np.where(sides[starts], _PARALLELEPIPED_COST, np.bincount(group)).tolist()
     return [
         _Box((i,), cost, tuple(low), tuple(high))
         for i, (cost, low, high) in enumerate(zip(inside, least, greatest, strict=True))
@@ -217,7 +218,7 @@ def _boxes(
 
 
 def _joined(boxes: Sequence[_Box], around: float) -> list[_Box]:
-    """Neighbours become one cluster where that is cheaper, and where there would be too many."""
+    """Clusters of boxes: neighbours become one where that is cheaper, and where there would be too many."""
     done = _in_space(boxes)
     dearer = 0.0
     while True:
@@ -236,7 +237,7 @@ def _joined(boxes: Sequence[_Box], around: float) -> list[_Box]:
 
 
 def _in_space(boxes: Sequence[_Box]) -> list[_Box]:
-    """In the order of a curve that fills space (Morton 1966), so that neighbours are near each other."""
+    """The boxes along a curve that fills space (Morton 1966), which puts near ones next to each other."""
     centers = np.array([box.least for box in boxes]) + np.array([box.greatest for box in boxes])
     centers -= centers.min(axis=0)
     cells = (centers * (1023 / max(float(centers.max()), 1e-30))).astype(np.int64)

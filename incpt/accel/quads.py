@@ -1,9 +1,9 @@
-"""The facets of a mesh of few triangles: parallelograms where two of them make one up, single triangles
-elsewhere; and the parallelepipeds that six parallelograms make up.
+"""The quads of a mesh of few triangles, and the parallelepipeds among them.
 
-Blocks of paths meet a small top level without a tree (cl/sweep.cl). There a parallelogram costs a ray little
-more than one triangle, a parallelepiped little more than one of its sides; and what people build of few
-triangles is mostly rectangles and boxes.
+A quad is a parallelogram where two triangles make one up, and a single triangle elsewhere. Blocks of paths
+test a small scene by brute force, without a tree (cl/cpu/brute_force.cl). There a parallelogram costs a ray
+little more than one triangle, and a parallelepiped of six of them little more than one of its sides. What
+people build of few triangles is mostly rectangles and boxes.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy.typing as npt
 from incpt.scene.mesh import Mesh
 
 SIDES = 6
-"""Of a parallelepiped."""
+"""How many quads bound a parallelepiped."""
 
 _TOLERANCE = 2.0**-22
 """How far corners may be off a parallelogram, relative to the largest coordinate: what rounding makes."""
@@ -25,19 +25,19 @@ _MOST_IN_A_GROUP = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Facets:
-    """How the faces of a mesh pair up; F facets, each face is in one.
+class Quads:
+    """How the faces of a mesh pair up. Each face is in one of Q quads.
 
-    corners  (F, 4) int32 indices of vertices A, B, C and D on the way around; D is C for a single triangle.
-    faces    (F, 2) int32: the face with corners A, B, C, and the one with A, C, D; the same one for a single
+    corners  (Q, 4) int32 indices of vertices A, B, C and D on the way around; D is C for a single triangle.
+    faces    (Q, 2) int32: the face with corners A, B, C, and the one with A, C, D; the same one for a single
              triangle.
-    turns    (F, 2) uint32: which corner of these faces A is.
-    along    (F,) uint32: for a side of a parallelepiped, which of its axes lead from A to B and from A to D:
+    turns    (Q, 2) uint32: which corner of these faces A is.
+    along    (Q,) uint32: for a side of a parallelepiped, which of its axes lead from A to B and from A to D:
              their numbers in bits 0 and 1, 3 and 4; bits 2 and 5 are set where they lead backwards.
-    loose    the number of facets that belong to no parallelepiped. Behind them stand the sides of each: where
+    loose    the number of quads that belong to no parallelepiped. Behind them stand the sides of each: where
              its first axis is 0, where that is 1, where its second axis is 0 ...
-    solids   (S, 4) int32 indices of vertices: a corner of each parallelepiped and the ends of its axes.
-    groups   where facets begin that lie near each other, parallelograms before triangles; the sides of a
+    parallelepipeds  (P, 4) int32 indices of vertices: a corner of each and the ends of its axes.
+    groups   where quads begin that lie near each other, parallelograms before triangles; the sides of a
              parallelepiped are one.
     """
 
@@ -46,7 +46,7 @@ class Facets:
     turns: npt.NDArray[np.uint32]
     along: npt.NDArray[np.uint32]
     loose: int
-    solids: npt.NDArray[np.int32]
+    parallelepipeds: npt.NDArray[np.int32]
     groups: tuple[int, ...]
 
 
@@ -59,8 +59,8 @@ class _Pair(NamedTuple):
     other_corner: int
 
 
-def find_facets(mesh: Mesh) -> Facets:
-    """The facets of a mesh."""
+def find_quads(mesh: Mesh) -> Quads:
+    """The quads of a mesh."""
     pairs = _chosen(_parallelograms(mesh))
     alone = set(range(len(mesh.faces))) - {f for pair in pairs for f in (pair.face, pair.other)}
     rows = np.array(pairs + [_Pair(f, 0, f, 0) for f in sorted(alone)], np.int32).reshape(-1, 4)
@@ -69,49 +69,49 @@ def find_facets(mesh: Mesh) -> Facets:
     last = mesh.faces[faces[:, 1], (turns[:, 1] + 2) % 3]
     corners = np.column_stack([first, last]).astype(np.int32)
 
-    solids = _solids(mesh, corners[: len(pairs)])
-    sides = [side for solid in solids for side in solid.sides]
+    found = _parallelepipeds(mesh, corners[: len(pairs)])
+    sides = [side for each in found for side in each.sides]
     loose = np.setdiff1d(np.arange(len(corners)), np.array(sides, np.intp))
     groups = _groups(mesh.vertices[corners].mean(axis=1), loose)
     order = np.concatenate([*groups, np.array(sides, np.intp)])
-    starts = np.cumsum([0, *map(len, groups), *[SIDES] * len(solids)])[:-1]
+    starts = np.cumsum([0, *map(len, groups), *[SIDES] * len(found)])[:-1]
     along = np.zeros(len(corners), np.uint32)
-    along[sides] = [bits for solid in solids for bits in solid.along]
-    return Facets(
+    along[sides] = [bits for each in found for bits in each.along]
+    return Quads(
         corners[order],
         faces[order],
         turns[order].astype(np.uint32),
         along[order],
         len(loose),
-        np.array([solid.vertices for solid in solids], np.int32).reshape(-1, 4),
+        np.array([each.vertices for each in found], np.int32).reshape(-1, 4),
         tuple(starts.tolist()),
     )
 
 
-class _Solid(NamedTuple):
-    """A parallelepiped: its sides as indices of facets, and the rest as `Facets` has it."""
+class _Parallelepiped(NamedTuple):
+    """One parallelepiped: its sides are indices of quads; the rest is as `Quads` has it."""
 
     sides: tuple[int, ...]
     along: tuple[int, ...]
     vertices: tuple[int, ...]
 
 
-def _solids(mesh: Mesh, corners: npt.NDArray[np.int32]) -> list[_Solid]:
+def _parallelepipeds(mesh: Mesh, corners: npt.NDArray[np.int32]) -> list[_Parallelepiped]:
     """Those among parallelograms with these corners (F, 4) that share no corner with others."""
     points = _same_points(mesh.vertices)[corners]
-    bodies: dict[int, set[int]] = {}  # facets, by each point that they share
+    bodies: dict[int, set[int]] = {}  # quads, by each point that they share
     for f, own in enumerate(points.tolist()):
         body = set.union({f}, *(bodies.get(point, set()) for point in own))
         for member in body:
             bodies.update(dict.fromkeys(points[member].tolist(), body))
     found = {id(body): body for body in bodies.values() if len(body) == SIDES}
-    solids = (_solid(mesh, corners, points, sorted(body)) for body in found.values())
-    return [solid for solid in solids if solid is not None]
+    candidates = (_parallelepiped(mesh, corners, points, sorted(body)) for body in found.values())
+    return [each for each in candidates if each is not None]
 
 
-def _solid(
+def _parallelepiped(
     mesh: Mesh, corners: npt.NDArray[np.int32], points: npt.NDArray[np.intp], body: list[int]
-) -> _Solid | None:
+) -> _Parallelepiped | None:
     """The parallelepiped that six parallelograms make up, if they do."""
     origin = int(points[body[0], 0])
     vertex = dict(zip(points[body].ravel().tolist(), corners[body].ravel().tolist(), strict=True))
@@ -137,7 +137,7 @@ def _solid(
         side = 2 * axis + int(a[axis])
         sides[side] = f
         along[side] = to_b | int(a[to_b]) << 2 | to_d << 3 | int(a[to_d]) << 5
-    return _Solid(tuple(sides), tuple(along), tuple(vertices)) if -1 not in sides else None
+    return _Parallelepiped(tuple(sides), tuple(along), tuple(vertices)) if -1 not in sides else None
 
 
 def _chosen(possible: list[_Pair]) -> list[_Pair]:

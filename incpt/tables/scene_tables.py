@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
-from incpt.accel import bvh, clusters, quads
+from incpt.accel import bvh, clusters, quads, top_level
 from incpt.core import layout, transform
 from incpt.core.transform import Vector
 from incpt.device.device import Device
@@ -115,7 +115,7 @@ class DeviceScene:
         self.environment_probability = 0.0
         self._light_scale = 0.0
         self._trees: WeakKeyDictionary[Mesh, bvh.Bvh] = WeakKeyDictionary()
-        self._facets: WeakKeyDictionary[Mesh, quads.Facets] = WeakKeyDictionary()
+        self._quads: WeakKeyDictionary[Mesh, quads.Quads] = WeakKeyDictionary()
         self._places: dict[Mesh, tuple[int, int, int]] = {}
         nothing = np.zeros(0, layout.OBJECT), np.zeros((0, 2, 3)), np.zeros(0, np.int64)
         self._objects = _ObjectTable((), *nothing, {})
@@ -153,7 +153,7 @@ class DeviceScene:
 
     @property
     def has_trees(self) -> bool:
-        """Whether rays go through trees, after what is swept."""
+        """Whether rays go through trees, beside what is tested by brute force."""
         return not (self._all_on_top and self._few_on_top)
 
     @property
@@ -231,54 +231,30 @@ class DeviceScene:
         """The top level; `vertices`: in world space, those of the objects whose triangles are part of it."""
         others = _all_but(len(self.scene.objects), np.array(list(vertices), np.int64))
         bounds = self._objects.bounds[others]
-        triangles, swept = self._triangles_on_top(vertices) if vertices else (None, None)
+        meshes = [top_level.PlacedMesh(i, self.scene.objects[i].mesh, v) for i, v in vertices.items()]
+        triangles = top_level.join_triangles(self.device, meshes) if meshes else None
+        tree = triangles.tree if triangles else None
+        brute_force = clusters.arrange(triangles, self._quads_of) if triangles else None
         self._all_on_top = len(others) == 0
-        self._few_on_top = swept is not None
-        self._upload("top_nodes", bvh.build_top_with_triangles(self.device, bounds, others, triangles))
-        self._upload("top_packs", _joined([triangles.packs] if triangles else [], layout.TRIANGLE_PACK))
+        self._few_on_top = brute_force is not None
+        nodes = top_level.build_top_with_triangles(self.device, bounds, others, tree)
+        self._upload("top_nodes", nodes)
+        self._upload("top_packs", _joined([tree.packs] if tree else [], layout.TRIANGLE_PACK))
         self._buffers["block_nodes"] = self._buffers["top_nodes"]
-        if swept is not None:
+        if brute_force is not None:
             # Blocks of paths meet those triangles without a tree, and take it for the other objects alone.
-            self._upload("block_nodes", bvh.build_top_with_triangles(self.device, bounds, others, None))
-        tables = swept if swept is not None else clusters.empty_tables()
+            alone = top_level.build_top_with_triangles(self.device, bounds, others, None)
+            self._upload("block_nodes", alone)
+        tables = brute_force if brute_force is not None else clusters.empty_tables()
         self.cluster_count = len(tables.clusters)
-        self._upload("facets", _joined([tables.facets], layout.FACET))
-        self._upload("solids", _joined([tables.solids], layout.SOLID))
+        self._upload("facets", _joined([tables.quads], layout.FACET))
+        self._upload("solids", _joined([tables.parallelepipeds], layout.SOLID))
         self._upload("clusters", tables.clusters)
 
-    def _triangles_on_top(
-        self, vertices: dict[int, npt.NDArray[np.float32]]
-    ) -> tuple[bvh.Bvh, clusters.Tables | None]:
-        """The tree over the triangles of these objects, whose packs tell object and face, and what blocks of
-        paths are swept over instead, where that is quicker."""
-        meshes = [self.scene.objects[i].mesh for i in vertices]
-        first_vertices = np.cumsum([0, *(len(v) for v in vertices.values())]).tolist()
-        first_faces = np.cumsum([0, *(len(mesh.faces) for mesh in meshes)]).tolist()
-        all_vertices = np.concatenate(list(vertices.values()))
-        faces = [mesh.faces + first for mesh, first in zip(meshes, first_vertices, strict=False)]
-        tree = bvh.build_triangles(self.device, all_vertices, np.concatenate(faces).astype(np.int32))
-        counts = [len(f) for f in faces]
-        owner = np.repeat(np.array(list(vertices), np.uint32), counts)
-        own_face = np.concatenate([np.arange(n, dtype=np.uint32) for n in counts])
-        face = tree.packs["face"]
-        used = face != layout.NO_INDEX
-        places = np.empty(len(own_face), np.uint32)
-        places[face[used]] = np.flatnonzero(used) | layout.NODE_PACK
-        tree.packs["object"][used] = owner[face[used]]
-        face[used] = own_face[face[used]]
-        if not clusters.may_be_few(meshes):
-            return tree, None
-        parts = [
-            clusters.Part(self._facets_of(mesh), *place)
-            for mesh, *place in zip(meshes, vertices, first_vertices, first_faces, strict=False)
-        ]
-        flat = np.isnan(tree.packs["vertex"][:, 0]).ravel()
-        return tree, clusters.arrange(parts, all_vertices, places, flat)
-
-    def _facets_of(self, mesh: Mesh) -> quads.Facets:
-        if mesh not in self._facets:
-            self._facets[mesh] = quads.find_facets(mesh)
-        return self._facets[mesh]
+    def _quads_of(self, mesh: Mesh) -> quads.Quads:
+        if mesh not in self._quads:
+            self._quads[mesh] = quads.find_quads(mesh)
+        return self._quads[mesh]
 
     def _build_environment(self) -> None:
         image = self.scene.environment.image

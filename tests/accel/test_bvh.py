@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from incpt.accel import bvh
+from incpt.accel import bvh, top_level
 from incpt.core import layout, transform
 from incpt.core.errors import InputError
 from incpt.core.layout import HitPlane, PathClass, PathPlane, RayPlane, ShadowPlane
@@ -66,7 +66,7 @@ class World:
             counts[0] += len(tree.nodes)
             counts[1] += len(tree.packs)
         bounds = np.array([obj.world_bounds for obj in self.objects]).reshape(-1, 2, 3)
-        top = bvh.build_top(self.device, bounds)
+        top = top_level.build_top(self.device, bounds)
         records = np.zeros(max(len(self.objects), 1), layout.OBJECT)
         for record, obj in zip(records, self.objects, strict=False):
             matrix = obj.world_from_object
@@ -309,7 +309,7 @@ def test_top_level_has_every_object_once(device: Device, count: int) -> None:
     rng = np.random.default_rng(count)
     lower = rng.normal(size=(count, 3)) * 10
     bounds = np.stack([lower, lower + rng.random((count, 3))], axis=1)
-    tree = bvh.build_top(device, bounds)
+    tree = top_level.build_top(device, bounds)
     assert len(tree.packs) == 0 and len(tree.nodes) >= 1
     if count:
         check_tree(tree, bounds, is_mesh=False)

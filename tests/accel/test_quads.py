@@ -1,4 +1,4 @@
-"""Parallelograms and parallelepipeds among few triangles, and the sweep of rays over them."""
+"""Parallelograms and parallelepipeds among few triangles, and rays against them by brute force."""
 
 from __future__ import annotations
 
@@ -68,8 +68,8 @@ def turned(mesh: Mesh, seed: int) -> Mesh:
 # --------------------------------------------------------------------------------------------- pairing
 
 
-def check_facets(mesh: Mesh, own: quads.Facets) -> int:
-    """Asserts that facets are what they are said to be; returns how many are parallelograms."""
+def check_quads(mesh: Mesh, own: quads.Quads) -> int:
+    """Asserts that quads are what they are said to be; returns how many are parallelograms."""
     pairs = own.faces[:, 0] != own.faces[:, 1]
     every = np.concatenate([own.faces[:, 0], own.faces[pairs, 1]])
     assert sorted(every) == list(range(len(mesh.faces)))
@@ -88,15 +88,15 @@ def check_facets(mesh: Mesh, own: quads.Facets) -> int:
     return int(pairs.sum())
 
 
-def check_sides(mesh: Mesh, own: quads.Facets) -> None:
+def check_sides(mesh: Mesh, own: quads.Quads) -> None:
     """Sides stand in order, and local axes lead from A to B and to D as they are said to."""
-    assert len(own.faces) == own.loose + 6 * len(own.solids)
+    assert len(own.faces) == own.loose + 6 * len(own.parallelepipeds)
     assert (own.along[: own.loose] == 0).all()
     position = mesh.vertices.astype(np.float64)
-    for solid, first in zip(own.solids, range(own.loose, len(own.faces), 6), strict=True):
-        axes = position[solid[1:]] - position[solid[0]]
+    for body, first in zip(own.parallelepipeds, range(own.loose, len(own.faces), 6), strict=True):
+        axes = position[body[1:]] - position[body[0]]
         for side in range(6):
-            local = np.linalg.solve(axes.T, (position[own.corners[first + side]] - position[solid[0]]).T).T
+            local = np.linalg.solve(axes.T, (position[own.corners[first + side]] - position[body[0]]).T).T
             np.testing.assert_allclose(local[:, side // 2], side % 2, atol=1e-5)
             for bits, corner in ((own.along[first + side] & 7, 1), (own.along[first + side] >> 3, 3)):
                 expected = np.zeros(3)
@@ -116,9 +116,9 @@ def test_a_cube_is_a_parallelepiped(matrix: Any, seed: int | None) -> None:
     mesh = sheared(shape("cube"), matrix)
     if seed is not None:
         mesh = turned(mesh, seed)
-    own = quads.find_facets(mesh)
-    assert check_facets(mesh, own) == 6
-    assert own.loose == 0 and len(own.solids) == 1
+    own = quads.find_quads(mesh)
+    assert check_quads(mesh, own) == 6
+    assert own.loose == 0 and len(own.parallelepipeds) == 1
 
 
 def joined(*meshes: Mesh) -> Mesh:
@@ -131,11 +131,11 @@ def moved(mesh: Mesh, *by: float) -> Mesh:
     return Mesh(mesh.vertices + np.float32(by), mesh.faces)
 
 
-def test_parallelepipeds_beside_other_facets() -> None:
+def test_parallelepipeds_beside_other_quads() -> None:
     mesh = joined(moved(grid(3, 2), 5, 0, 0), shape("cube"), soup(3, 1), moved(shape("cube"), 0, 3, 0))
-    own = quads.find_facets(mesh)
-    assert check_facets(mesh, own) == 6 + 12
-    assert own.loose == 6 + 3 and len(own.solids) == 2
+    own = quads.find_quads(mesh)
+    assert check_quads(mesh, own) == 6 + 12
+    assert own.loose == 6 + 3 and len(own.parallelepipeds) == 2
 
 
 _CUBE = shape("cube")
@@ -154,9 +154,9 @@ _CUBE = shape("cube")
     ids=["open", "half", "corner", "side", "frustum", "flat"],
 )
 def test_what_is_no_parallelepiped(mesh: Mesh) -> None:
-    own = quads.find_facets(mesh)
-    check_facets(mesh, own)
-    assert len(own.solids) == 0 and own.loose == len(own.faces)
+    own = quads.find_quads(mesh)
+    check_quads(mesh, own)
+    assert len(own.parallelepipeds) == 0 and own.loose == len(own.faces)
 
 
 @pytest.mark.slow
@@ -165,13 +165,13 @@ def test_nets_pair_up_whatever_corner_faces_start_with(
     columns: int, rows: int, skew: float, seed: int
 ) -> None:
     mesh = turned(grid(columns, rows, skew), seed)
-    assert check_facets(mesh, quads.find_facets(mesh)) >= 0.9 * columns * rows
+    assert check_quads(mesh, quads.find_quads(mesh)) >= 0.9 * columns * rows
 
 
 @given(st.integers(1, 40), st.integers(0, 99))
 def test_triangles_that_share_nothing_stay_alone(count: int, seed: int) -> None:
     mesh = soup(count, seed)
-    assert check_facets(mesh, quads.find_facets(mesh)) == 0
+    assert check_quads(mesh, quads.find_quads(mesh)) == 0
 
 
 @pytest.mark.parametrize(
@@ -185,12 +185,12 @@ def test_triangles_that_share_nothing_stay_alone(count: int, seed: int) -> None:
 )
 def test_what_is_no_parallelogram(faces: list[list[int]]) -> None:
     points = np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0.5, 0], [0, 1, 1e-3]])
-    assert check_facets(Mesh(points, faces), quads.find_facets(Mesh(points, faces))) == 0
+    assert check_quads(Mesh(points, faces), quads.find_quads(Mesh(points, faces))) == 0
 
 
 def test_half_a_parallelogram_in_large_coordinates_is_told_by_its_rounding() -> None:
     far = Mesh(grid(2, 2).vertices * np.float32(1e-3) + np.float32(1000.1), grid(2, 2).faces)
-    assert check_facets(far, quads.find_facets(far)) == 4
+    assert check_quads(far, quads.find_quads(far)) == 4
 
 
 # ------------------------------------------------------------------------------------------- clusters
@@ -211,17 +211,17 @@ def arranged(device: Device, scene: Scene) -> dict[str, npt.NDArray[np.void]]:
     return tables
 
 
-def check_tables(tables: dict[str, npt.NDArray[np.void]], loose: int, solids: int) -> None:
+def check_tables(tables: dict[str, npt.NDArray[np.void]], loose: int, parallelepipeds: int) -> None:
     rows, table = tables["facets"], tables["clusters"]
     assert len(table) <= clusters.MOST_CLUSTERS
-    for first, end, count in (("first", "end", loose), ("first_solid", "solid_end", solids)):
+    for first, end, count in (("first", "end", loose), ("first_solid", "solid_end", parallelepipeds)):
         assert table[first].tolist() == [0, *table[end][:-1].tolist()] and table[end][-1] == count
-    assert tables["solids"]["first_side"][:solids].tolist() == [loose + 6 * i for i in range(solids)]
-    for solid in tables["solids"][:solids]:
-        away = (
-            rows["vertex"][solid["first_side"] : solid["first_side"] + 6].reshape(6, 4, 3) - solid["corner"]
-        )
-        local = away @ solid["local_from_world"].reshape(3, 3).T
+    assert tables["solids"]["first_side"][:parallelepipeds].tolist() == [
+        loose + 6 * i for i in range(parallelepipeds)
+    ]
+    for body in tables["solids"][:parallelepipeds]:
+        away = rows["vertex"][body["first_side"] : body["first_side"] + 6].reshape(6, 4, 3) - body["corner"]
+        local = away @ body["local_from_world"].reshape(3, 3).T
         for side in range(6):
             np.testing.assert_allclose(local[side, :, side // 2], side % 2, atol=1e-3)
     for i, cluster in enumerate(table):
@@ -240,7 +240,7 @@ def check_tables(tables: dict[str, npt.NDArray[np.void]], loose: int, solids: in
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 60), st.integers(0, 6), st.integers(0, 10), st.integers(0, 99))
-def test_every_facet_is_in_a_cluster(device: Device, planes: int, cubes: int, alone: int, seed: int) -> None:
+def test_every_quad_is_in_a_cluster(device: Device, planes: int, cubes: int, alone: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     meshes = [shape("plane")] * planes + [shape("cube")] * cubes + ([soup(alone, seed)] if alone else [])
     objects = [
@@ -287,7 +287,7 @@ def test_faces_without_area_are_left_out(device: Device) -> None:
     check_tables(arranged(device, scene_of([Object("none", nothing, "white")])), 0, 0)
 
 
-# ---------------------------------------------------------------------------------------------- sweep
+# ---------------------------------------------------------------------------------------------- brute force
 
 _KERNEL = """
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
@@ -313,13 +313,13 @@ hits_of_rays(const uint count, __global const float *given, BLOCK_PARAMETERS, __
 """
 
 
-def hits(device: Device, scene: Scene, rays: Floats, swept: bool) -> Floats:
-    """(HIT_PLANES, N) of what `rays` (6, N) meet, swept or by the way of trees."""
+def hits(device: Device, scene: Scene, rays: Floats, by_brute_force: bool) -> Floats:
+    """(HIT_PLANES, N) of what `rays` (6, N) meet, by brute force or by the way of trees."""
     described = DeviceScene(device, scene)
     assert "FEW_ON_TOP" in described.variant
-    features = tuple(name for name in described.variant if swept or name != "FEW_ON_TOP")
+    features = tuple(name for name in described.variant if by_brute_force or name != "FEW_ON_TOP")
     arguments = block_arguments(described)
-    if not swept:
+    if not by_brute_force:
         arguments[0] = described.buffer("top_nodes")
     program = cl.Program(device.context, device.program_text("trace_blocks", features) + _KERNEL)
     kernel = cl.Kernel(program.build(options=["-cl-std=CL1.2"]), "hits_of_rays")
@@ -345,18 +345,18 @@ def rays_at(scene: Scene, count: int, seed: int, size: float = 1.0) -> Floats:
     return np.ascontiguousarray(np.hstack([origins, directions]).T, np.float32)
 
 
-def check_sweep(device: Device, scene: Scene, rays: Floats) -> None:
-    swept, walked = (hits(device, scene, rays, way) for way in (True, False))
-    found, expected = (h[HitPlane.OBJECT].view(np.uint32) != layout.NO_INDEX for h in (swept, walked))
+def check_brute_force(device: Device, scene: Scene, rays: Floats) -> None:
+    forced, walked = (hits(device, scene, rays, way) for way in (True, False))
+    found, expected = (h[HitPlane.OBJECT].view(np.uint32) != layout.NO_INDEX for h in (forced, walked))
     np.testing.assert_array_equal(found, expected)
     assert 0.05 < found.mean() < 1
-    swept, walked = swept[:, found], walked[:, found]
+    forced, walked = forced[:, found], walked[:, found]
     scale = np.abs(walked[HitPlane.POSITION_X : HitPlane.POSITION_Z + 1]).max()
-    distances = (hit[HitPlane.DISTANCE] for hit in (swept, walked))
+    distances = (hit[HitPlane.DISTANCE] for hit in (forced, walked))
     np.testing.assert_allclose(*distances, rtol=1e-5, atol=3e-7 * scale)
     same = np.ones(found.sum(), np.bool_)
     for plane in (HitPlane.OBJECT, HitPlane.TRIANGLE, HitPlane.MATERIAL):
-        same &= swept[plane].view(np.uint32) == walked[plane].view(np.uint32)
+        same &= forced[plane].view(np.uint32) == walked[plane].view(np.uint32)
     assert same.mean() > 0.99  # the others lie on an edge
     for first, atol in (
         (HitPlane.POSITION_X, 3e-6 * scale),
@@ -364,7 +364,7 @@ def check_sweep(device: Device, scene: Scene, rays: Floats) -> None:
         (HitPlane.SHADING_X, 1e-4),
     ):
         np.testing.assert_allclose(
-            swept[first : first + 3, same], walked[first : first + 3, same], rtol=0, atol=atol
+            forced[first : first + 3, same], walked[first : first + 3, same], rtol=0, atol=atol
         )
 
 
@@ -379,17 +379,17 @@ def placed(meshes: Sequence[Mesh], seed: int) -> Scene:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
-def test_the_sweep_meets_what_trees_meet(device: Device, seed: int) -> None:
+def test_brute_force_meets_what_trees_meet(device: Device, seed: int) -> None:
     """Object, face, position and normals, whichever half of a parallelogram and wherever faces start."""
     if not traces_in_blocks(device):
         pytest.skip("no blocks on this device")
     meshes = [turned(grid(2, 3, 0.4), seed), shape("cube"), soup(9, seed), turned(shape("cube"), seed + 1)]
     scene = placed(meshes, seed)
-    check_sweep(device, scene, rays_at(scene, 5000, seed))
+    check_brute_force(device, scene, rays_at(scene, 5000, seed))
 
 
 @pytest.mark.parametrize("size", [1e-5, 1e5])
-def test_the_sweep_in_small_and_large_scenes(device: Device, size: float) -> None:
+def test_brute_force_in_small_and_large_scenes(device: Device, size: float) -> None:
     if not traces_in_blocks(device):
         pytest.skip("no blocks on this device")
     scene = placed([turned(grid(3, 3), 5), shape("cube")], 5)
@@ -398,7 +398,7 @@ def test_the_sweep_in_small_and_large_scenes(device: Device, size: float) -> Non
         for obj in scene.objects
     ]
     scene = replace(scene, objects=tuple(objects))
-    check_sweep(device, scene, rays_at(scene, 3000, 5, size))
+    check_brute_force(device, scene, rays_at(scene, 3000, 5, size))
 
 
 def test_no_ray_slips_through_the_seams_of_parallelograms(device: Device) -> None:
@@ -419,7 +419,7 @@ def test_no_ray_slips_through_the_seams_of_parallelograms(device: Device) -> Non
     direction = target - origin
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     rays = np.ascontiguousarray(np.hstack([origin, direction]).T, np.float32)
-    found = hits(device, scene, rays, swept=True)
+    found = hits(device, scene, rays, by_brute_force=True)
     assert (found[HitPlane.OBJECT].view(np.uint32) == 0).all()
 
 
@@ -434,7 +434,7 @@ def test_rays_along_the_sides_of_a_parallelepiped(device: Device) -> None:
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     rays = np.ascontiguousarray(np.hstack([origins, directions]).T, np.float32)
     scene = scene_of([Object("room", shape("cube"), "white", scale=(2, 2, 2))])
-    found, expected = (hits(device, scene, rays, swept) for swept in (True, False))
+    found, expected = (hits(device, scene, rays, way) for way in (True, False))
     assert (found[HitPlane.OBJECT].view(np.uint32) == 0).all()
     distances = (planes[HitPlane.DISTANCE] for planes in (found, expected))
     np.testing.assert_allclose(*distances, rtol=1e-5, atol=1e-6)
@@ -468,7 +468,7 @@ def test_rays_from_a_side_never_meet_it_again(device: Device, name: str, placeme
     def met(starts: npt.NDArray[Any], directions: npt.NDArray[Any]) -> Floats:
         unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
         rays = np.ascontiguousarray(np.hstack([starts, unit]).T, np.float32)
-        return hits(device, scene, rays, swept=True)
+        return hits(device, scene, rays, by_brute_force=True)
 
     first = met(origins, targets - origins)
     first = first[:, first[HitPlane.OBJECT].view(np.uint32) != layout.NO_INDEX]
@@ -490,7 +490,7 @@ def test_rays_from_a_side_never_meet_it_again(device: Device, name: str, placeme
 
 
 @pytest.mark.parametrize(
-    ("count", "mesh", "is_swept"),
+    ("count", "mesh", "by_brute_force"),
     [
         (40, None, True),
         (200, None, False),
@@ -500,15 +500,15 @@ def test_rays_from_a_side_never_meet_it_again(device: Device, name: str, placeme
     ],
     ids=["boxes", "many boxes", "balls", "more balls", "small balls"],
 )
-def test_what_is_quicker_by_a_tree_is_not_swept(
-    device: Device, count: int, mesh: Mesh | None, is_swept: bool
+def test_what_is_quicker_by_a_tree_is_not_done_by_brute_force(
+    device: Device, count: int, mesh: Mesh | None, by_brute_force: bool
 ) -> None:
     variant = DeviceScene(device, crowd(count, mesh)).variant
-    assert "ALL_ON_TOP" in variant and ("FEW_ON_TOP" in variant) == is_swept
+    assert "ALL_ON_TOP" in variant and ("FEW_ON_TOP" in variant) == by_brute_force
 
 
-def test_dear_clusters_are_not_swept(device: Device) -> None:
-    """Few enough facets, but nearly all rays would meet all of them."""
+def test_dear_clusters_are_not_done_by_brute_force(device: Device) -> None:
+    """Few enough quads, but nearly all rays would meet all of them."""
     nest = Object("nest", soup(100, 3), "white")
     assert "FEW_ON_TOP" not in DeviceScene(device, scene_of([nest])).variant
     assert "FEW_ON_TOP" in DeviceScene(device, scene_of([replace(nest, mesh=soup(30, 3))])).variant

@@ -376,7 +376,7 @@ def test_failed_edit_keeps_scene_and_picture(device: Device, monkeypatch: pytest
         raise MemoryError
 
     with monkeypatch.context() as patch:
-        patch.setattr("incpt.accel.bvh.build_top", fail)
+        patch.setattr("incpt.accel.top_level.build_top", fail)
         with pytest.raises(MemoryError):
             session.edit(moved(scene))
     assert session.scene is scene and session.mode is Mode.REFINE

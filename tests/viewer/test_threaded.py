@@ -118,7 +118,7 @@ def test_problem_of_a_request_or_an_edit_ends_nothing(
     def fail(*_: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("incpt.accel.bvh.build_top", fail)
+    monkeypatch.setattr("incpt.accel.top_level.build_top", fail)
     renderer.show(View(moved(mixed_scene()), target_spp=3))
     problem = wait_for(renderer, Problem)
     assert problem == Problem("memory ran out; use a smaller image or scene")

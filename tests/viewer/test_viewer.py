@@ -243,7 +243,7 @@ def test_refused_edit_is_told_once_and_the_old_picture_goes_on(
         raise MemoryError
 
     with monkeypatch.context() as patch:
-        patch.setattr("incpt.accel.bvh.build_top", fail)
+        patch.setattr("incpt.accel.top_level.build_top", fail)
         with pytest.raises(MemoryError):
             live.advance(bad)
         end = frames_until_rest(live, bad)[-1]
