@@ -21,7 +21,8 @@ from incpt.benchmarks.kit.tables import print_table
 from incpt.benchmarks.kit.timing import interleaved, significant, summary
 from incpt.device.device import Device
 from incpt.scene.mesh import Mesh
-from incpt.tables.scene_tables import DeviceScene
+from incpt.tables.geometry_pool import GeometryPool
+from incpt.tables.scene_tables import tables_of
 
 NAME = "build"
 TRIANGLES = (1_000, 10_000, 100_000, 1_000_000, 5_000_000)
@@ -103,12 +104,13 @@ def _top(device: Device, count: int, work: Work) -> dict[str, Any]:
 
 def _move(device: Device, count: int, work: Work) -> dict[str, Any]:
     scene = crowd(count)
-    on_device = DeviceScene(device, scene)
+    pool = GeometryPool.of(device)
+    tables = tables_of(pool, scene)
     _warm_up(device, work)
     name = scene.objects[-1].name
     moved = scene.with_object(name, position=(0.0, 1.0, 0.0))
     began = time.perf_counter()
-    on_device.update(moved)
+    tables_of(pool, moved, tables)
     device.finish()
     return {"ms": 1e3 * (time.perf_counter() - began), "count": count}
 

@@ -67,6 +67,6 @@ class OrderedSession(Session):
         filled = self.device.upload(slots)
         self.device.finish()
         began = time.perf_counter()
-        self._wavefront.trace(self._device_scene, params, filled, paths, self._radiance)
+        self._wavefront.trace(self._tables, params, filled, paths, self._radiance)
         self.device.finish()
         return time.perf_counter() - began

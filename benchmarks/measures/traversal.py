@@ -20,7 +20,8 @@ from incpt.device.device import Device
 from incpt.render.wavefront import block_arguments, traces_in_blocks
 from incpt.scene.camera import Camera
 from incpt.scene.model import Scene
-from incpt.tables.scene_tables import DeviceScene
+from incpt.tables.geometry_pool import GeometryPool
+from incpt.tables.scene_tables import tables_of
 
 Floats = npt.NDArray[np.float32]
 
@@ -57,13 +58,14 @@ class Tracer:
 
     def __init__(self, device: Device, scene: Scene, in_blocks: bool | None = None) -> None:
         self.device = device
-        described = DeviceScene(device, scene)
-        self.in_squares = described.has_trees
-        self._buffers = described.geometry[:5]
+        # The buffers hold the scene as long as its tables live.
+        self._tables = tables_of(GeometryPool.of(device), scene)
+        self.in_squares = self._tables.has_trees
+        self._buffers = self._tables.geometry[:5]
         self._in_blocks = traces_in_blocks(device) if in_blocks is None else in_blocks
-        self._arguments = block_arguments(described) if self._in_blocks else self._buffers
+        self._arguments = block_arguments(self._tables) if self._in_blocks else self._buffers
         own = (resources.files("incpt.benchmarks") / "measures/trace.cl").read_text("utf-8")
-        file, features = ("trace_blocks", described.variant) if self._in_blocks else ("bvh", ())
+        file, features = ("trace_blocks", self._tables.variant) if self._in_blocks else ("bvh", ())
         program = device.build(f"{device.program_text(file, features)}\n{own}", "measures/trace.cl")
         self._kernels = {name: cl.Kernel(program, name) for name in ("trace_closest", "trace_any")}
         text = counting_source(device.program_text("bvh"))

@@ -61,7 +61,7 @@ class Device:
             ) from error
         self._kernels: dict[tuple[str, tuple[str, ...]], cl.Kernel] = {}
         self.built: set[tuple[str, ...]] = set()
-        """The variants of the kernels that were built as a whole; see `DeviceScene.variant`."""
+        """The variants of the kernels that were built as a whole; see `SceneTables.variant`."""
 
     @property
     def name(self) -> str:
@@ -146,6 +146,18 @@ class Device:
         except cl.Error as error:
             raise DeviceError(_explain(error, "a read")) from error
         return array
+
+    def copy(
+        self, target: cl.Buffer, source: cl.Buffer, nbytes: int, target_offset: int, source_offset: int
+    ) -> None:
+        """Copy `nbytes` between buffers, from these offsets in bytes on, once all earlier work is done."""
+        try:
+            cl.enqueue_copy(
+                self.queue, target, source,
+                byte_count=nbytes, dst_offset=target_offset, src_offset=source_offset,
+            )  # fmt: skip
+        except cl.Error as error:
+            raise DeviceError(_explain(error, "a copy")) from error
 
     def fill(self, buffer: cl.Buffer, value: int, nbytes: int, offset: int = 0) -> None:
         """Set `nbytes` of `buffer` to the 32-bit pattern `value`."""

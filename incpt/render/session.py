@@ -27,7 +27,8 @@ from incpt.render.plan import Cursor, Queue, is_done, plan_step
 from incpt.render.wavefront import Wavefront
 from incpt.scene.change import Change, affected_objects, diff
 from incpt.scene.model import Object, Scene
-from incpt.tables.scene_tables import DeviceScene
+from incpt.tables.geometry_pool import GeometryPool
+from incpt.tables.scene_tables import tables_of
 
 # Kernels index the three planes of the path buffer with 32 bits.
 _MOST_PATH_FLOATS = 1 << 32
@@ -80,14 +81,14 @@ class Session:
         self.settings = settings if size is None else replace(settings, size=size)
         self.device = device if isinstance(device, Device) else Device(device)
         self._wavefront = Wavefront(self.device)
-        self._device_scene = DeviceScene(self.device, scene)
+        self._tables = tables_of(GeometryPool.of(self.device), scene)
         self._cursor = Cursor()
         self._buffer_stride = 0
         self._start_film()
 
     @property
     def scene(self) -> Scene:
-        return self._device_scene.scene
+        return self._tables.scene
 
     @property
     def size(self) -> tuple[int, int]:
@@ -127,7 +128,7 @@ class Session:
         params = self._params()
         filled = self.device.upload(plan.slots)
         paths = len(plan.slots) * self.settings.tile_size**2
-        self._wavefront.trace(self._device_scene, params, filled, paths, self._radiance)
+        self._wavefront.trace(self._tables, params, filled, paths, self._radiance)
         self._film.reduce(params, plan, filled, self._radiance)
         nonfinite = self._film.take_nonfinite()
         if queue.replaces:
@@ -166,8 +167,8 @@ class Session:
         with self._unchanged_on_error():
             if settings is not None:
                 self.configure(settings)
-            # Last, since the scene on the device is not put back here.
-            change = self._device_scene.update(scene)
+            change = diff(old, scene)
+            self._tables = tables_of(self._tables.pool, scene, self._tables)
         changed = affected_objects(old, scene, change)
         affected = changed
         if since is not None and not (drag := diff(since, scene)).is_global:
@@ -229,8 +230,7 @@ class Session:
             self._tile_spp = snapshot.tile_spp.copy()
             self._mode, self._queue = snapshot.mode, snapshot.queue
             self._cursor = Cursor(snapshot.cursor.tiles)
-            # Last, since the scene on the device is not put back here.
-            self._device_scene.update(snapshot.scene)
+            self._tables = tables_of(self._tables.pool, snapshot.scene, self._tables)
 
     def image(self, alpha: bool = False) -> npt.NDArray[np.float32]:
         """(H, W, 3) mean radiance, linear; row 0 is on top. What is not rendered anew yet shows the old
@@ -292,12 +292,12 @@ class Session:
         """Build every kernel that the scene as it is now needs, so that no later call has to wait for one.
         `on_progress` is called with how many of how many steps are done; not at all if nothing is to do.
         What it raises ends the building, which may go on later."""
-        kernels = self._device_scene.variant
+        kernels = self._tables.variant
         if kernels in self.device.built:
             return
         params, slots = self._params(), self.device.upload(_one_slot())
         steps = [
-            *self._wavefront.idle_launches(self._device_scene, params, slots, self._radiance),
+            *self._wavefront.idle_launches(self._tables, params, slots, self._radiance),
             *self._film.idle_launches(params, self._radiance),
         ]
         for done, step in enumerate(steps, 1):
@@ -317,7 +317,7 @@ class Session:
         surface, object_ids = self.device.empty(28 * pixels), self.device.empty(4 * pixels)
         radiance = self.device.empty(12 * (paths + layout.WORK_GROUP_SIZE))
         self._wavefront.first_hits(
-            self._device_scene, params, self.device.upload(slots), paths, surface, object_ids, radiance
+            self._tables, params, self.device.upload(slots), paths, surface, object_ids, radiance
         )
         return (
             self.device.read(surface, np.empty(7 * pixels, np.float32)),
@@ -415,13 +415,13 @@ class Session:
         params["camera"] = (camera.position, right, up, forward)
         params["width"], params["height"] = width, height
         params["tile_size"] = settings.tile_size
-        params["in_squares"] = self._device_scene.has_trees
+        params["in_squares"] = self._tables.has_trees
         params["buffer_stride"] = self._buffer_stride
         for name in ("seed", "max_bounces", "transmission_bounces", "roulette_depth"):
             params[name] = getattr(settings, name)
-        params["light_count"] = self._device_scene.light_count
-        params["environment_probability"] = self._device_scene.environment_probability
-        params["environment_color"] = self._device_scene.environment_radiance
+        params["light_count"] = self._tables.light_count
+        params["environment_probability"] = self._tables.environment_probability
+        params["environment_color"] = self._tables.environment_radiance
         if scene.environment.image is not None:
             shape = scene.environment.image.pixels.shape
             params["environment_height"], params["environment_width"] = shape[:2]

@@ -19,7 +19,7 @@ import pyopencl as cl
 
 from incpt.core import layout
 from incpt.device.device import BUILD_SIZES, Device
-from incpt.tables.scene_tables import DeviceScene
+from incpt.tables.scene_tables import SceneTables
 
 _MOST_LISTS = 3
 _MOST_RAYS = 256
@@ -45,7 +45,7 @@ def traces_in_blocks(device: Device) -> bool:
     return device.is_clang_cpu and device.cl_device.local_mem_size >= _BLOCK_BYTES
 
 
-def block_arguments(scene: DeviceScene) -> list[Any]:
+def block_arguments(scene: SceneTables) -> list[Any]:
     """What kernels over blocks of paths need of a scene, and the memory of a block."""
     memory = [cl.LocalMemory(4 * n * layout.BLOCK_STRIDE) for n in _BLOCK_PLANES]
     return [
@@ -78,7 +78,7 @@ class Wavefront:
 
     def trace(
         self,
-        scene: DeviceScene,
+        scene: SceneTables,
         params: npt.NDArray[np.void],
         slots: cl.Buffer,
         path_count: int,
@@ -99,7 +99,7 @@ class Wavefront:
 
     def _trace_blocks(
         self,
-        scene: DeviceScene,
+        scene: SceneTables,
         params: npt.NDArray[np.void],
         slots: cl.Buffer,
         path_count: int,
@@ -114,7 +114,7 @@ class Wavefront:
 
     def first_hits(
         self,
-        scene: DeviceScene,
+        scene: SceneTables,
         params: npt.NDArray[np.void],
         slots: cl.Buffer,
         path_count: int,
@@ -131,7 +131,7 @@ class Wavefront:
             self._describe(scene, chunk, pixels, surface, object_ids)
 
     def idle_launches(
-        self, scene: DeviceScene, params: npt.NDArray[np.void], slots: cl.Buffer, radiance: cl.Buffer
+        self, scene: SceneTables, params: npt.NDArray[np.void], slots: cl.Buffer, radiance: cl.Buffer
     ) -> list[Callable[[], None]]:
         """A launch of every kernel that `trace` and `first_hits` may need for this scene, each with nothing
         to do; see `Device.built`. `slots` holds one slot, which lanes without a path read."""
@@ -183,7 +183,7 @@ class Wavefront:
         return chunk
 
     def _bounce(
-        self, scene: DeviceScene, params: npt.NDArray[np.void], ray: int, count: int, radiance: cl.Buffer
+        self, scene: SceneTables, params: npt.NDArray[np.void], ray: int, count: int, radiance: cl.Buffer
     ) -> int:
         """Ray number `ray` of every live path; returns how many paths go on."""
         self._intersect(scene, params, count)
@@ -214,14 +214,14 @@ class Wavefront:
         self._live, self._next = self._next, self._live
         return next_count
 
-    def _intersect(self, scene: DeviceScene, params: npt.NDArray[np.void], count: int) -> None:
+    def _intersect(self, scene: SceneTables, params: npt.NDArray[np.void], count: int) -> None:
         self._launch(
             "intersect", count, params, np.uint32(count), self._live, *scene.geometry,
             scene.buffer("normals"), self._rays, self._paths, self._hits,
         )  # fmt: skip
 
     def _escape(
-        self, scene: DeviceScene, params: npt.NDArray[np.void], count: int, radiance: cl.Buffer
+        self, scene: SceneTables, params: npt.NDArray[np.void], count: int, radiance: cl.Buffer
     ) -> None:
         self._launch(
             "shade_miss", count, params, np.uint32(count), self._escaped, scene.buffer("materials"),
@@ -231,7 +231,7 @@ class Wavefront:
 
     def _shade(
         self,
-        scene: DeviceScene,
+        scene: SceneTables,
         params: npt.NDArray[np.void],
         count: int,
         radiance: cl.Buffer,
@@ -244,7 +244,7 @@ class Wavefront:
         )  # fmt: skip
 
     def _occlude(
-        self, scene: DeviceScene, params: npt.NDArray[np.void], count: int, radiance: cl.Buffer
+        self, scene: SceneTables, params: npt.NDArray[np.void], count: int, radiance: cl.Buffer
     ) -> None:
         self._launch(
             "trace_shadow", count, params, np.uint32(count), self._shadowed, *scene.geometry[:5],
@@ -253,7 +253,7 @@ class Wavefront:
 
     def _describe(
         self,
-        scene: DeviceScene,
+        scene: SceneTables,
         params: npt.NDArray[np.void],
         pixels: np.uint32,
         surface: cl.Buffer,
@@ -265,7 +265,7 @@ class Wavefront:
         )  # fmt: skip
 
     def _illuminate(
-        self, scene: DeviceScene, params: npt.NDArray[np.void], count: int, paths: cl.Buffer
+        self, scene: SceneTables, params: npt.NDArray[np.void], count: int, paths: cl.Buffer
     ) -> None:
         if scene.features:
             self._launch(
@@ -274,7 +274,7 @@ class Wavefront:
             )  # fmt: skip
 
     def _shade_media(
-        self, scene: DeviceScene, params: npt.NDArray[np.void], count: int, radiance: cl.Buffer
+        self, scene: SceneTables, params: npt.NDArray[np.void], count: int, radiance: cl.Buffer
     ) -> int:
         """Shade the paths at or in transparent bodies. Those that stand on an opaque surface in there join
         the others; returns how many they are then."""

@@ -1,14 +1,16 @@
-"""Tables for light sampling: emissive triangles chosen by power, and the environment by luminance."""
+"""Emissive triangles, from which light sampling chooses by their power."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import pyopencl as cl
 
 from incpt.core import layout, transform
-from incpt.scene.image import Image
+from incpt.device.device import Device
 from incpt.scene.material import Material
 from incpt.scene.model import Scene
 
@@ -36,6 +38,37 @@ class TriangleLights:
     @property
     def count(self) -> int:
         return int(self.planes.shape[1])
+
+
+@dataclass(frozen=True, eq=False)
+class LightTables:
+    """The buffers, by name, and how light sampling chooses.
+
+    count                    how many triangles there are to choose from
+    density_scale            density per area of choosing a point on a triangle, over its `radiant_weight`
+    environment_probability  the chance that light sampling turns to the environment's image
+    """
+
+    buffers: Mapping[str, cl.Buffer]
+    count: int
+    density_scale: float
+    environment_probability: float
+
+
+def light_tables(device: Device, scene: Scene, has_image: bool) -> LightTables:
+    """Those of a scene; `has_image` tells whether its environment has an image that shines."""
+    emissive = {name for name, material in scene.materials.items() if material.is_emissive}
+    has_triangles = any(obj.material in emissive and obj.visible for obj in scene.objects)
+    share = 0.0 if not has_triangles else 0.5 if has_image else 1.0
+    table = triangle_lights(scene, share)
+    if table.count == 0:
+        share = 0.0
+    return LightTables(
+        {"lights": device.upload(table.planes)},
+        table.count,
+        density_scale=share / table.total if table.count else 0.0,
+        environment_probability=1.0 - share if has_image else 0.0,
+    )
 
 
 def triangle_lights(scene: Scene, share: float) -> TriangleLights:
@@ -107,44 +140,3 @@ def alias_table(
         if scaled[j] < 1.0:
             small.append(large.pop())
     return probability, alias
-
-
-@dataclass(frozen=True, eq=False)
-class EnvironmentTable:
-    """Piecewise constant density over the unit square of a lat-long image, rows from +y.
-
-    marginal     (height + 1,) cumulative distribution of rows
-    conditional  (height, width + 1) of the texels of each row
-    texel_pdf    (height, width) density over the unit square
-    """
-
-    marginal: npt.NDArray[np.float32]
-    conditional: npt.NDArray[np.float32]
-    texel_pdf: npt.NDArray[np.float32]
-
-
-def environment_table(image: Image) -> EnvironmentTable | None:
-    """The table of an image, by luminance times the sine of the polar angle; None where it is black."""
-    brightness = luminance(image.pixels)
-    # Bilinear interpolation carries a texel's light half a texel further; the density follows it there.
-    brightness = (np.roll(brightness, 1, axis=1) + 2 * brightness + np.roll(brightness, -1, axis=1)) / 4
-    padded = np.pad(brightness, ((1, 1), (0, 0)), mode="edge")
-    brightness = (padded[:-2] + 2 * brightness + padded[2:]) / 4
-    height, width = brightness.shape
-    weight = brightness * np.sin((np.arange(height) + 0.5) * np.pi / height)[:, None]
-    total = weight.sum()
-    if not total > 0:
-        return None
-    rows = weight.sum(axis=1)
-    conditional = np.zeros((height, width + 1))
-    np.cumsum(weight, axis=1, out=conditional[:, 1:])
-    # A black row is never chosen; a ramp keeps its table valid.
-    conditional[rows == 0] = np.linspace(0, 1, width + 1)
-    conditional /= conditional[:, -1:]
-    marginal = np.concatenate([[0.0], np.cumsum(rows)]) / total
-    marginal[-1] = 1.0
-    return EnvironmentTable(
-        marginal.astype(np.float32),
-        conditional.astype(np.float32),
-        (weight / total * (width * height)).astype(np.float32),
-    )

@@ -25,7 +25,8 @@ from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
-from incpt.tables.scene_tables import DeviceScene
+from incpt.tables.geometry_pool import GeometryPool
+from incpt.tables.scene_tables import SceneTables, tables_of
 
 Floats = npt.NDArray[np.float32]
 
@@ -200,15 +201,19 @@ def scene_of(objects: Sequence[Object]) -> Scene:
     return Scene(Camera(), Environment(color=(1, 1, 1)), {"white": Material()}, tuple(objects))
 
 
+def described(device: Device, scene: Scene) -> SceneTables:
+    return tables_of(GeometryPool.of(device), scene)
+
+
 def arranged(device: Device, scene: Scene) -> dict[str, npt.NDArray[np.void]]:
     """FACET, SOLID and CLUSTER as they are on the device."""
-    described = DeviceScene(device, scene)
-    tables = {}
+    tables = described(device, scene)
+    found = {}
     for name, dtype in (("facets", layout.FACET), ("solids", layout.SOLID), ("clusters", layout.CLUSTER)):
-        buffer = described.buffer(name)
-        tables[name] = device.read(buffer, np.empty(buffer.size // dtype.itemsize, dtype))
-    assert described.cluster_count == len(tables["clusters"])
-    return tables
+        buffer = tables.buffer(name)
+        found[name] = device.read(buffer, np.empty(buffer.size // dtype.itemsize, dtype))
+    assert tables.cluster_count == len(found["clusters"])
+    return found
 
 
 def check_tables(tables: dict[str, npt.NDArray[np.void]], loose: int, parallelepipeds: int) -> None:
@@ -250,7 +255,7 @@ def test_every_quad_is_in_a_cluster(device: Device, planes: int, cubes: int, alo
         for i, mesh in enumerate(meshes)
     ]
     scene = scene_of(objects)
-    if "FEW_ON_TOP" not in DeviceScene(device, scene).variant:
+    if "FEW_ON_TOP" not in described(device, scene).variant:
         return
     tables = arranged(device, scene)
     assert len(tables["facets"]) == planes + 6 * cubes + alone
@@ -315,12 +320,12 @@ hits_of_rays(const uint count, __global const float *given, BLOCK_PARAMETERS, __
 
 def hits(device: Device, scene: Scene, rays: Floats, by_brute_force: bool) -> Floats:
     """(HIT_PLANES, N) of what `rays` (6, N) meet, by brute force or by the way of trees."""
-    described = DeviceScene(device, scene)
-    assert "FEW_ON_TOP" in described.variant
-    features = tuple(name for name in described.variant if by_brute_force or name != "FEW_ON_TOP")
-    arguments = block_arguments(described)
+    tables = described(device, scene)
+    assert "FEW_ON_TOP" in tables.variant
+    features = tuple(name for name in tables.variant if by_brute_force or name != "FEW_ON_TOP")
+    arguments = block_arguments(tables)
     if not by_brute_force:
-        arguments[0] = described.buffer("top_nodes")
+        arguments[0] = tables.buffer("top_nodes")
     program = cl.Program(device.context, device.program_text("trace_blocks", features) + _KERNEL)
     kernel = cl.Kernel(program.build(options=["-cl-std=CL1.2"]), "hits_of_rays")
     count = rays.shape[1]
@@ -503,12 +508,12 @@ def test_rays_from_a_side_never_meet_it_again(device: Device, name: str, placeme
 def test_what_is_quicker_by_a_tree_is_not_done_by_brute_force(
     device: Device, count: int, mesh: Mesh | None, by_brute_force: bool
 ) -> None:
-    variant = DeviceScene(device, crowd(count, mesh)).variant
+    variant = described(device, crowd(count, mesh)).variant
     assert "ALL_ON_TOP" in variant and ("FEW_ON_TOP" in variant) == by_brute_force
 
 
 def test_dear_clusters_are_not_done_by_brute_force(device: Device) -> None:
     """Few enough quads, but nearly all rays would meet all of them."""
     nest = Object("nest", soup(100, 3), "white")
-    assert "FEW_ON_TOP" not in DeviceScene(device, scene_of([nest])).variant
-    assert "FEW_ON_TOP" in DeviceScene(device, scene_of([replace(nest, mesh=soup(30, 3))])).variant
+    assert "FEW_ON_TOP" not in described(device, scene_of([nest])).variant
+    assert "FEW_ON_TOP" in described(device, scene_of([replace(nest, mesh=soup(30, 3))])).variant

@@ -21,7 +21,7 @@ from incpt.render.wavefront import traces_in_blocks
 from incpt.scene.image import Image
 from incpt.scene.material import Material
 from incpt.scene.model import Scene
-from incpt.tables.scene_tables import DeviceScene
+from incpt.tables.scene_tables import SceneTables
 
 
 def test_choice_by_index_name_and_variable(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -201,37 +201,37 @@ def test_blocks_are_the_same_without_instructions_of_avx512(
         session = Session(small(make), device=device)
         session.render(8)
         images.append(session.image())
-        portable = (*session._device_scene.variant, "PORTABLE_LANES")
-        monkeypatch.setattr(DeviceScene, "variant", portable)
+        portable = (*session._tables.variant, "PORTABLE_LANES")
+        monkeypatch.setattr(SceneTables, "variant", portable)
     np.testing.assert_allclose(images[0], images[1], rtol=1e-5)
 
 
 def test_variant_for_matt_scenes_follows_materials(device: Device) -> None:
     box = cornell()
     session = Session(box, size=(8, 8), device=device)
-    assert "MATT" in session._device_scene.variant
+    assert "MATT" in session._tables.variant
     clear = Material(transmission=1.0)  # opaque never, so that its layer does not count
     session.edit(Scene(box.camera, box.environment, {**box.materials, "clear": clear}, box.objects))
-    assert "MATT" in session._device_scene.variant
+    assert "MATT" in session._tables.variant
     for change in ({"specular": 0.5}, {"metallic": 1.0}, {"specular": 1.0, "transmission": 0.5}):
         session.edit(box.with_material("white", **change))
-        assert "MATT" not in session._device_scene.variant
+        assert "MATT" not in session._tables.variant
 
 
 def test_variant_for_clear_media_follows_absorption(device: Device) -> None:
     scene = glass()
     session = Session(scene, size=(40, 24), device=device)
-    assert "CLEAR_MEDIA" in session._device_scene.variant
+    assert "CLEAR_MEDIA" in session._tables.variant
     session.render(16)
     clear = session.image()
     # Next to nothing is absorbed, but the variant that could do it is taken.
     session.edit(scene.with_material("glass", absorption=(1e-9, 0, 0)))
-    assert "CLEAR_MEDIA" not in session._device_scene.variant
+    assert "CLEAR_MEDIA" not in session._tables.variant
     session.restart()
     session.render(16)
     np.testing.assert_allclose(session.image(), clear, rtol=1e-4, atol=1e-5)
     session.edit(cornell())
-    assert "CLEAR_MEDIA" not in session._device_scene.variant
+    assert "CLEAR_MEDIA" not in session._tables.variant
 
 
 def test_devices_agree(device: Device) -> None:

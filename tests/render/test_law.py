@@ -122,9 +122,9 @@ def test_edits_then_convergence_equal_a_fresh_render(
     assert session.mode is Mode.REFINE
     counts = np.unique(spp)
     image = session.image()
-    fresh = Session(
-        scene, size=(20, 14), settings=replace(scene.settings, slots_per_step=None), device=device
-    )
+    settings = replace(scene.settings, slots_per_step=None)
+    # Of a copy of the scene no tables live, so that they are made without those of the scenes before.
+    fresh = Session(replace(scene), size=(20, 14), settings=settings, device=device)
     for count in range(NOR, int(counts[-1]) + 1, NOR):
         fresh.render(count)
         here = spp == count
@@ -147,7 +147,7 @@ def test_edits_then_convergence_equal_a_fresh_render_with_other_numbers(
     pictures = []
     for seed in range(4):
         settings = replace(scene.settings, seed=10 + seed, base_nor=64)
-        fresh = Session(scene, size=(20, 14), settings=settings, device=device)
+        fresh = Session(replace(scene), size=(20, 14), settings=settings, device=device)
         fresh.render(128)
         pictures.append(fresh.image())
     mean, deviation = np.mean(pictures, axis=0), np.std(pictures, axis=0, ddof=1)

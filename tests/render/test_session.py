@@ -19,11 +19,12 @@ from incpt.scene.environment import Environment
 from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
-from incpt.tables import scene_tables
+from incpt.tables import object_table
 
 
 def rendered(device: Device, scene: Scene, spp: int, **settings: object) -> Session:
-    session = Session(scene, settings=replace(scene.settings, **settings), device=device)
+    # Of a copy of the scene no tables live, so that they are made without those of the scenes before.
+    session = Session(replace(scene), settings=replace(scene.settings, **settings), device=device)
     session.render(spp)
     return session
 
@@ -555,9 +556,9 @@ def test_triangles_on_top_look_like_objects(
     scene = scene.with_added(Object("hidden", shape("cube"), "red", scale=(3, 3, 3), visible=False))
     expected = Session(scene, device=device)
     expected.render(8)
-    monkeypatch.setattr(scene_tables, "_MOST_FACES_ON_TOP", of_one)
-    monkeypatch.setattr(scene_tables, "_MOST_FACES_IN_ALL_ON_TOP", of_all)
-    session = Session(scene, device=device)
+    monkeypatch.setattr(object_table, "_MOST_FACES_OF_ONE", of_one)
+    monkeypatch.setattr(object_table, "_MOST_FACES_OF_ALL", of_all)
+    session = Session(replace(scene), device=device)  # of a copy no tables live
     session.render(8)
     difference = np.abs(session.image() - expected.image())
     assert np.median(difference) < 1e-5

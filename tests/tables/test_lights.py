@@ -1,4 +1,4 @@
-"""Light sampling: tables of incpt/lights.py, functions of cl/light.cl."""
+"""Light sampling: incpt/tables/lights.py and environment.py, functions of cl/scene/light.cl."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
-from incpt.tables import lights
+from incpt.tables import environment, lights
 
 COUNT = 1 << 17
 Array = npt.NDArray[np.floating]
@@ -34,7 +34,7 @@ def _light_call(
     planes: Array | None = None, image: Image | None = None, **inputs: npt.NDArray[np.generic],
 ) -> list[npt.NDArray[np.float32]]:  # fmt: skip
     nothing = np.zeros(1, np.float32)
-    table = None if image is None else lights.environment_table(image)
+    table = None if image is None else environment.image_density(image)
     return call(
         "light", _EMITTERS + body, count, outputs, features, p=struct_rows(layout.PARAMS, [params]),
         lights=nothing if planes is None else planes, image=nothing if image is None else image.pixels,
@@ -310,7 +310,7 @@ def test_environment_samples_estimate_its_light() -> None:
 
 
 def test_black_image_has_no_table() -> None:
-    assert lights.environment_table(Image(np.zeros((4, 8, 3), np.float32))) is None
+    assert environment.image_density(Image(np.zeros((4, 8, 3), np.float32))) is None
 
 
 def test_lights_weigh_by_luminance_and_sides() -> None:

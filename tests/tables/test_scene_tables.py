@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import count
 from typing import Any
@@ -13,16 +14,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from incpt.core import layout
+from incpt.core.errors import DeviceError
 from incpt.core.layout import LightPlane
 from incpt.device.device import Device
 from incpt.scene.camera import Camera
 from incpt.scene.change import diff
 from incpt.scene.environment import Environment
+from incpt.scene.image import Image
 from incpt.scene.material import Material
+from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
-from incpt.tables import scene_tables
-from incpt.tables.scene_tables import DeviceScene
+from incpt.tables import object_table, range_buffer
+from incpt.tables.geometry_pool import GeometryPool
+from incpt.tables.scene_tables import SceneTables, tables_of
 
 MATERIALS = {
     "matt": Material(specular=0.0),
@@ -48,11 +53,17 @@ def placed(name: str, number: int) -> Object:
 
 EDITS = st.lists(
     st.tuples(
-        st.sampled_from(("move", "hide", "assign", "add", "remove", "swap", "mesh")), st.integers(0, 99)
+        st.sampled_from(
+            ("move", "hide", "assign", "add", "remove", "swap", "mesh", "deform", "shine", "tint", "name",
+             "sky", "light", "camera")
+        ),
+        st.integers(0, 99),
+        st.booleans(),
     ),
     min_size=1,
-    max_size=6,
-)
+    max_size=8,
+)  # fmt: skip
+"""What is done, to which object, and whether the tables before go on to live."""
 
 
 def edited(scene: Scene, kind: str, number: int) -> Scene:
@@ -60,85 +71,196 @@ def edited(scene: Scene, kind: str, number: int) -> Scene:
     if kind == "add" or not objects:
         free = next(name for name in map(str, count()) if name not in scene.object_index)
         return scene.with_added(placed(free, number))
+    whole: dict[str, Callable[[], Scene]] = {
+        "remove": lambda: scene.without_object(obj.name),
+        "shine": lambda: scene.with_material("matt", emission=(number % 3, 0, 1)),
+        "tint": lambda: scene.with_material("glass", absorption=(number % 2, 0, 1)),
+        "name": lambda: scene.with_material(f"new {number % 4}", roughness=0.3),
+        "sky": lambda: scene.with_environment(image=SKIES[number % len(SKIES)]),
+        "light": lambda: scene.with_environment(intensity=float(number % 3)),
+        "camera": lambda: scene.with_camera(position=(0.0, number, 5.0)),
+    }
     i = number % len(objects)
     obj = objects[i]
-    if kind == "remove":
-        return scene.without_object(obj.name)
+    if kind in whole:
+        return whole[kind]()
     if kind == "swap":
         objects[i], objects[-1] = objects[-1], objects[i]
         return replace(scene, objects=tuple(objects))
     changes: dict[str, Any] = {
         "move": {"position": (0.1 * number, 0.0, 1.0)},
         "hide": {"visible": not obj.visible},
-        "assign": {"material": list(MATERIALS)[number % len(MATERIALS)]},
+        "assign": {"material": list(scene.materials)[number % len(scene.materials)]},
         "mesh": {"mesh": shape(SHAPES[number % len(SHAPES)])},
+        "deform": {"mesh": replace(obj.mesh, vertices=obj.mesh.vertices * np.float32([1, 0.9, 1.2]))},
     }[kind]
     return scene.with_object(obj.name, **changes)
 
 
-def contents(device: Device, described: DeviceScene) -> dict[str, npt.NDArray[np.uint8]]:
-    """Buffers, byte for byte, but those of meshes: their order tells which came first."""
-    names = ("top_packs", "facets", "solids", "clusters", "materials")
-    found = {name: read(device, described, name) for name in names}
-    if described.light_count:  # in whatever order: no object refers to them
-        planes = read(device, described, "lights").view(np.float32).reshape(len(LightPlane), -1)
+SKIES = (
+    None,
+    Image(np.zeros((4, 8, 3), np.float32)),
+    Image(np.linspace(0, 1, 96, dtype=np.float32).reshape(4, 8, 3)),
+)
+NAMES = (
+    "top_nodes", "block_nodes", "top_packs", "facets", "solids", "clusters", "materials", "layers",
+    "environment_image", "marginal", "conditional", "texel_pdf",
+)  # fmt: skip
+"""The buffers but for those of meshes, and lights, whose order tells which came first."""
+VALUES = (
+    "variant", "has_media", "has_trees", "cluster_count", "light_count", "environment_probability",
+    "environment_radiance",
+)  # fmt: skip
+
+
+def contents(tables: SceneTables) -> dict[str, npt.NDArray[np.uint8]]:
+    """Buffers, byte for byte, but those of meshes."""
+    found = {name: read(tables, name) for name in NAMES}
+    if tables.light_count:  # in whatever order: no object refers to them
+        planes = read(tables, "lights").view(np.float32).reshape(len(LightPlane), -1)
         planes = planes[: LightPlane.ALIAS_PROBABILITY]
         found["lights"] = np.ascontiguousarray(planes[:, np.lexsort(planes)]).view(np.uint8)
     return found
 
 
-def read(device: Device, described: DeviceScene, name: str) -> npt.NDArray[np.uint8]:
-    buffer = described.buffer(name)
-    return device.read(buffer, np.empty(buffer.size, np.uint8))
+def read(tables: SceneTables, name: str) -> npt.NDArray[np.uint8]:
+    buffer = tables.buffer(name)
+    return tables.pool.device.read(buffer, np.empty(buffer.size, np.uint8))
 
 
-def objects_of(device: Device, described: DeviceScene) -> npt.NDArray[np.void]:
-    return read(device, described, "objects").view(layout.OBJECT)
+def objects_of(tables: SceneTables) -> npt.NDArray[np.void]:
+    return read(tables, "objects").view(layout.OBJECT)
 
 
 @pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 6), EDITS, st.sampled_from((20, 4096)))
 def test_after_any_edits_all_is_as_from_a_fresh_start(
-    device: Device, start: int, edits: list[tuple[str, int]], most_on_top: int
+    device: Device, start: int, edits: list[tuple[str, int, bool]], most_in_world_space: int
 ) -> None:
     with pytest.MonkeyPatch.context() as patch:
         # With few, objects come to the top level and leave it.
-        patch.setattr(scene_tables, "_MOST_FACES_IN_ALL_ON_TOP", most_on_top)
-        check_edits(device, start, edits)
+        patch.setattr(object_table, "_MOST_FACES_OF_ALL", most_in_world_space)
+        # Buffers of the pool grow and shrink, and meshes move, at the first occasion.
+        patch.setattr(range_buffer, "_LEAST_CAPACITY", 1)
+        check_edits(GeometryPool(device), start, edits)
 
 
-def check_edits(device: Device, start: int, edits: list[tuple[str, int]]) -> None:
-    scene = scene_of(placed(f"{i}", i) for i in range(start))
-    described = DeviceScene(device, scene)
-    for kind, number in edits:
-        scene = edited(scene, kind, number)
-        described.update(scene)
-    fresh = DeviceScene(device, scene)
-    assert described.variant == fresh.variant and described.cluster_count == fresh.cluster_count
-    for name, expected in contents(device, fresh).items():
-        np.testing.assert_array_equal(contents(device, described)[name], expected, err_msg=name)
+def check_edits(pool: GeometryPool, start: int, edits: list[tuple[str, int, bool]]) -> None:
+    tables = tables_of(pool, scene_of(placed(f"{i}", i) for i in range(start)))
+    living = []
+    for kind, number, lives_on in edits:
+        if lives_on:
+            living.append(tables)
+        tables = tables_of(pool, edited(tables.scene, kind, number), tables)
+    for each in (*living, tables):
+        check_as_fresh(each)
+
+
+def check_as_fresh(tables: SceneTables) -> None:
+    """Everything but the order of meshes is as on a device that has seen nothing else."""
+    scene = tables.scene
+    fresh = tables_of(GeometryPool(tables.pool.device), scene)
+    assert fresh is not tables
+    for name in VALUES:
+        assert getattr(tables, name) == getattr(fresh, name), name
+    for name, expected in contents(fresh).items():
+        np.testing.assert_array_equal(contents(tables)[name], expected, err_msg=name)
     if not scene.objects:
         return
-    rows, expected_rows = objects_of(device, described), objects_of(device, fresh)
+    rows, expected_rows = objects_of(tables), objects_of(fresh)
     for name in layout.OBJECT.names or ():
         if not name.startswith("first"):  # meshes stand in the order in which they came
             np.testing.assert_array_equal(rows[name], expected_rows[name], err_msg=name)
+    nodes, packs = read(tables, "nodes").view(layout.NODE), read(tables, "packs").view(layout.TRIANGLE_PACK)
+    normals = read(tables, "normals").view(np.float32)
     for row, obj in zip(rows, scene.objects, strict=True):
-        firsts = row["first_node"], row["first_pack"], row["first_normal"]
-        assert firsts == described._places[obj.mesh]
+        first_node, first_pack, first_normal = (
+            int(row[n]) for n in layout.OBJECT.names or () if "first" in n
+        )
+        check_mesh(obj.mesh, nodes[first_node:], packs[first_pack:])
+        if obj.mesh.normals is None:
+            assert first_normal == layout.NO_INDEX
+        else:
+            found = normals[first_normal : first_normal + obj.mesh.normals.size]
+            np.testing.assert_array_equal(found, obj.mesh.normals.ravel())
+
+
+def check_mesh(mesh: Mesh, nodes: npt.NDArray[np.void], packs: npt.NDArray[np.void]) -> None:
+    """From the first node one gets to every face once, and boxes hold what is below them."""
+    faces, stack = list[int](), [0]
+    while stack:
+        node = nodes[stack.pop()]
+        for child, reference in enumerate(node["child"].tolist()):
+            if reference == layout.NODE_EMPTY:
+                continue
+            if not reference & layout.NODE_LEAF:
+                stack.append(reference)
+                continue
+            pack = packs[reference & ~layout.NODE_LEAF]
+            used = pack["face"] != layout.NO_INDEX
+            corners = pack["vertex"][:, used].T.reshape(-1, 3, 3)
+            np.testing.assert_array_equal(corners, mesh.vertices[mesh.faces[pack["face"][used]]])
+            low, high = node["bounds"][:, child].reshape(3, 2).T
+            assert (corners >= low).all() and (corners <= high).all()
+            faces += pack["face"][used].tolist()
+    assert sorted(faces) == list(range(len(mesh.faces)))
+
+
+def test_tables_share_what_an_edit_leaves_alone(device: Device) -> None:
+    """Which parts are made anew, by edit: the table of the module, seen from outside."""
+    scene = scene_of(placed(f"{i}", i) for i in range(8))
+    expected = {
+        "camera": set(),
+        "tint": {"lights", "materials"},
+        "light": {"lights", "materials"},
+        "sky": {"environment", "lights", "materials"},
+        "assign": {"objects", "lights", "materials"},
+        "name": {"objects", "lights", "materials"},
+        "move": {"objects", "top_level", "lights", "materials"},
+        "hide": {"objects", "top_level", "lights", "materials"},
+        "deform": {"meshes", "objects", "top_level", "lights", "materials"},
+        "add": {"meshes", "objects", "top_level", "lights", "materials"},
+    }
+    before = tables_of(GeometryPool(device), scene)
+    for kind, parts in expected.items():
+        after = tables_of(before.pool, edited(scene, kind, 11), before)
+        names = ("meshes", "objects", "top_level", "environment", "lights", "materials")
+        assert {name for name in names if getattr(before, name) is not getattr(after, name)} == parts, kind
 
 
 def test_objects_that_stay_are_not_described_again(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = scene_of(placed(f"{i}", i) for i in range(40))
-    described = DeviceScene(device, scene)
+    tables = tables_of(GeometryPool(device), scene)
     again: list[str] = []
-    original = scene_tables._describe
+    original = object_table._describe
     monkeypatch.setattr(
-        scene_tables, "_describe", lambda obj, *rest: (again.append(obj.name), original(obj, *rest))
+        object_table, "_describe", lambda obj, *rest: (again.append(obj.name), original(obj, *rest))
     )
-    described.update(scene.with_object("7", position=(9.0, 0.0, 0.0)))
+    tables_of(tables.pool, scene.with_object("7", position=(9.0, 0.0, 0.0)), tables)
     assert again == ["7"]
+
+
+@pytest.mark.parametrize(
+    "place", ["accel.bvh.build_mesh", "accel.top_level.build_top", "tables.albedo.layer_row"]
+)
+def test_after_an_error_the_tables_before_are_right(
+    device: Device, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    scene = scene_of(placed(f"{i}", i) for i in range(4))
+    tables = tables_of(GeometryPool(device), scene)
+    after = scene.with_added(placed("new", 5)).with_object("0", position=(0.0, 7.0, 0.0))
+    after = after.with_object("1", mesh=replace(shape("sphere"), vertices=2 * shape("sphere").vertices))
+
+    def fail(*_: object) -> None:
+        raise DeviceError("device memory ran out")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(f"incpt.{place}", fail)
+        with pytest.raises(DeviceError):
+            tables_of(tables.pool, after, tables)
+    check_as_fresh(tables)
+    check_as_fresh(tables_of(tables.pool, after, tables))
 
 
 @given(st.permutations(range(6)), st.sets(st.integers(0, 5)), st.integers(0, 3), st.integers(0, 3))

@@ -88,7 +88,8 @@ def run_to(live: Live, view: View, condition: Callable[[Frame], bool], most: int
 
 def assert_fresh(device: Device, frame: Frame, scene: Scene, spp: int) -> None:
     """The frame shows what a new session would."""
-    fresh = Session(scene, device=device)
+    # Of a copy of the scene no tables live, so that they are made without those of the scenes before.
+    fresh = Session(replace(scene), device=device)
     fresh.render(spp)
     picture = frame.pictures[-1]
     assert (picture.tile_spp == spp).all()

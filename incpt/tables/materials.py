@@ -1,0 +1,63 @@
+"""The materials of a scene on the device."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pyopencl as cl
+
+from incpt.core import layout
+from incpt.device.device import Device
+from incpt.scene.material import Material
+from incpt.tables import albedo, lights
+
+_COPIED = ("base_color", "metallic", "emission", "roughness", "absorption", "specular", "ior", "transmission",
+           "priority")  # fmt: skip
+"""What rows take over from materials as it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class MaterialTables:
+    """The buffers, by name, and what all materials have in common.
+
+    has_media        whether any lets light through
+    is_matt          whether no surface that may be shaded as opaque has a specular layer or is metallic
+    is_media_clear   whether none that lets light through absorbs any of it
+    is_media_smooth  whether none that lets light through is rough
+    """
+
+    buffers: Mapping[str, cl.Buffer]
+    has_media: bool
+    is_matt: bool
+    is_media_clear: bool
+    is_media_smooth: bool
+
+
+def material_tables(
+    device: Device, materials: Mapping[str, Material], density_scale: float
+) -> MaterialTables:
+    """Those of `materials`, numbered in order. `density_scale` is that of LightTables."""
+    # One row at least: rays that miss read material 0.
+    rows = np.zeros(max(len(materials), 1), layout.MATERIAL)
+    layers = np.zeros((len(rows), layout.ALBEDO_TABLE_SIZE + 1), np.float32)
+    flags = layout.MaterialFlag
+    for row, layer, material in zip(rows, layers, materials.values(), strict=False):
+        for name in _COPIED:
+            row[name] = getattr(material, name)
+        row["light_pdf"] = lights.radiant_weight(material) * density_scale
+        row["flags"] = (flags.DOUBLE_SIDED if material.double_sided else 0) | (
+            flags.TRANSMISSIVE if material.transmission > 0 else 0
+        )
+        layer[:] = albedo.layer_row(material)
+    media = [material for material in materials.values() if material.transmission > 0]
+    # Of a material that lets all light through no opaque surface is ever shaded.
+    opaque = [material for material in materials.values() if material.transmission < 1]
+    return MaterialTables(
+        {"materials": device.upload(rows), "layers": device.upload(layers)},
+        has_media=bool(media),
+        is_matt=all(material.specular == material.metallic == 0 for material in opaque),
+        is_media_clear=not any(any(material.absorption) for material in media),
+        is_media_smooth=all(material.roughness**2 <= layout.MIN_ALPHA for material in media),
+    )
