@@ -12,7 +12,7 @@ import pyopencl as cl
 from incpt.core import layout, transform
 from incpt.device.device import Device
 from incpt.scene.material import Material
-from incpt.scene.model import Scene
+from incpt.scene.model import Object, Scene
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -57,9 +57,7 @@ class LightTables:
 
 def light_tables(device: Device, scene: Scene, has_image: bool) -> LightTables:
     """Those of a scene; `has_image` tells whether its environment has an image that shines."""
-    emissive = {name for name, material in scene.materials.items() if material.is_emissive}
-    has_triangles = any(obj.material in emissive and obj.visible for obj in scene.objects)
-    share = 0.0 if not has_triangles else 0.5 if has_image else 1.0
+    share = 0.0 if not _emissive_objects(scene) else 0.5 if has_image else 1.0
     table = triangle_lights(scene, share)
     if table.count == 0:
         share = 0.0
@@ -75,17 +73,14 @@ def triangle_lights(scene: Scene, share: float) -> TriangleLights:
     """Every visible emissive triangle that has an area. `share` is the chance that light sampling turns to
     triangles at all; the densities contain it."""
     corners, emission, weights, double_sided = [], [], [], []
-    radiant = {name: radiant_weight(material) for name, material in scene.materials.items()}
-    for obj in scene.objects:
-        if not obj.visible or radiant[obj.material] == 0:
-            continue
+    for obj in _emissive_objects(scene):
         material = scene.materials[obj.material]
         # A mirrored face keeps its outside: two corners change places to keep it on the normal's side.
         mirrored = np.linalg.det(obj.world_from_object[:, :3]) < 0
         faces = obj.mesh.faces[:, [0, 2, 1]] if mirrored else obj.mesh.faces
         corners.append(transform.apply_affine(obj.world_from_object, obj.mesh.vertices)[faces])
         emission.append(np.broadcast_to(material.emission, (len(faces), 3)))
-        weights.append(np.full(len(faces), radiant[obj.material]))
+        weights.append(np.full(len(faces), radiant_weight(material)))
         double_sided.append(np.full(len(faces), material.double_sided))
     if not corners:
         return TriangleLights(np.zeros((len(layout.LightPlane), 0), np.float32), 0.0)
@@ -96,6 +91,12 @@ def triangle_lights(scene: Scene, share: float) -> TriangleLights:
         np.concatenate(double_sided),
         share,
     )
+
+
+def _emissive_objects(scene: Scene) -> list[Object]:
+    """Those that are seen. They are few as a rule, and looking for them must be quick among thousands."""
+    emissive = {name for name, material in scene.materials.items() if material.is_emissive}
+    return [obj for obj in scene.objects if obj.material in emissive and obj.visible]
 
 
 def _triangle_planes(
