@@ -75,7 +75,9 @@ def edited(scene: Scene, kind: str, number: int) -> Scene:
         "remove": lambda: scene.without_object(obj.name),
         "shine": lambda: scene.with_material("matt", emission=(number % 3, 0, 1)),
         "tint": lambda: scene.with_material("glass", absorption=(number % 2, 0, 1)),
-        "name": lambda: scene.with_material(f"new {number % 4}", roughness=0.3),
+        "name": lambda: replace(
+            scene, materials={f"new {number}": Material(roughness=0.3), **scene.materials}
+        ),
         "sky": lambda: scene.with_environment(image=SKIES[number % len(SKIES)]),
         "light": lambda: scene.with_environment(intensity=float(number % 3)),
         "camera": lambda: scene.with_camera(position=(0.0, number, 5.0)),
@@ -143,6 +145,8 @@ def test_after_any_edits_all_is_as_from_a_fresh_start(
         patch.setattr(object_table, "_MOST_FACES_OF_ALL", most_in_world_space)
         # Buffers of the pool grow and shrink, and meshes move, at the first occasion.
         patch.setattr(range_buffer, "_LEAST_CAPACITY", 1)
+        patch.setattr(range_buffer, "_LEAST_USE", 1.0)
+        patch.setattr(range_buffer, "_ROOM", 1.0)
         check_edits(GeometryPool(device), start, edits)
 
 

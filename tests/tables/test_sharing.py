@@ -168,6 +168,35 @@ def test_two_sessions_take_turns(device: Device, monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.usefixtures("_alone")
+def test_tables_follow_meshes_that_move(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A mesh goes that lay in front of those of a session, which is not edited meanwhile."""
+    session = Session(with_ball(ball(2.6)), device=device)
+    pool = session._tables.pool
+    held = pool.hold([ball(2.7)])
+    session.edit(session.scene.with_object("ball", mesh=ball(2.8)))
+    session.render(2)
+    expected, packings = session.image(), pool.packings
+    held.clear()
+    monkeypatch.setattr(range_buffer, "_LEAST_USE", 1.0)
+    monkeypatch.setattr(range_buffer, "_ROOM", 1.0)
+    pool.shrink()
+    assert pool.packings > packings
+    session.restart()
+    session.render(2)
+    np.testing.assert_allclose(session.image(), expected, rtol=2e-4, atol=1e-5)
+
+
+@pytest.mark.usefixtures("_alone")
+def test_an_edit_after_a_large_scene_gives_memory_back(device: Device) -> None:
+    session = Session(with_ball(icosphere(6)), device=device)
+    pool = session._tables.pool
+    capacity = pool._packs.capacity
+    session.edit(session.scene.without_object("ball").without_object("glass ball"))
+    session.edit(session.scene.with_camera(fov_y=50.0))
+    assert pool._packs.capacity < capacity / 4
+
+
+@pytest.mark.usefixtures("_alone")
 def test_geometry_goes_with_the_last_session(device: Device) -> None:
     scene = with_ball(ball(2.5))
     first, second = (Session(replace(scene), device=device) for _ in range(2))
