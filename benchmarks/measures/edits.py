@@ -23,6 +23,7 @@ from incpt.render import tiles
 from incpt.render.modes import Mode
 from incpt.render.plan import Cursor, Queue
 from incpt.render.session import Session, Snapshot
+from incpt.render.strategies import strategy_of
 from incpt.scene.model import Scene
 
 Note = Callable[[float], None]
@@ -113,7 +114,7 @@ class EditBench:
         sums[3] = self.base_spp
         return Snapshot(
             self.scene, settings, sums, np.full(grid.count, self.base_spp, np.int64), Mode.REFINE,
-            Queue(tiles.base_queue(grid), settings.base_nor * settings.sample_rate, False),
+            Queue.even(tiles.base_queue(grid), settings.base_nor * settings.sample_rate, False),
             Cursor(),
         )  # fmt: skip
 
@@ -164,7 +165,7 @@ def edit_subject(
         "size": list(settings.size),
         "tile_size": settings.tile_size,
         "strategy": settings.strategy,
-        "nor": None if settings.strategy == "restart" else settings.nor,  # restarting does not use it
+        "nor": settings.nor if strategy_of(settings).uses_nor else None,
         **others,
         "base_spp": bench.base_spp,
         "reference_spp": bench.reference_spp,

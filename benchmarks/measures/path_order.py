@@ -24,7 +24,8 @@ copies of a tile together, as INCREMENTAL does it."""
 def spiral_tiles(session: Session, steps: int) -> IntArray:
     """(N,) the tiles that so many steps of a session from the start of its queue finish, one at least."""
     slots = session.grid.count * session.settings.sample_rate
-    return session.queue.tiles[: max(1, steps * slots // session.queue.samples)]
+    done = int(np.searchsorted(session.queue.ends, steps * slots, side="right"))
+    return session.queue.tiles[: max(1, done)]
 
 
 def ordered_slots(
@@ -33,14 +34,14 @@ def ordered_slots(
     """Slots for the paths of samples 0 ... `samples` - 1 of each pixel of `tiles`, and how many pixels wide
     each slot is."""
     if order == COPIES:
-        queue = Queue(tiles, samples, replaces=True)
+        queue = Queue.even(tiles, samples, replaces=True)
         none = np.zeros(grid.count, np.int64)
         return plan_step(grid, queue, Cursor(), len(tiles) * samples, none).slots, grid.tile_size
     if order == ROWS:
         pixels = np.flatnonzero(np.isin(grid.tile_of_pixels(), tiles)).astype(np.int32)
         grid, tiles = TileGrid(grid.width, grid.height, 1), pixels
     none = np.zeros(grid.count, np.int64)
-    one_pass = plan_step(grid, Queue(tiles, 1, replaces=False), Cursor(), len(tiles), none).slots
+    one_pass = plan_step(grid, Queue.even(tiles, 1, replaces=False), Cursor(), len(tiles), none).slots
     slots = np.tile(one_pass, samples)
     passes = np.repeat(np.arange(samples, dtype=np.uint32), len(one_pass))
     slots["first_sample"] += passes

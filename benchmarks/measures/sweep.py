@@ -28,6 +28,7 @@ from incpt.core.settings import STRATEGIES, RenderSettings
 from incpt.device.device import Device
 from incpt.formats import registry
 from incpt.formats.edit_script import Edit, EditScript, load_edits
+from incpt.render.strategies import RESTART
 from incpt.replay.replay import Variant, variants
 
 NAME = "sweep"
@@ -136,7 +137,7 @@ def nor_errors(results: Results, mark: str) -> dict[tuple[str, int | None], floa
     found = errors(results, mark)
     ratios: dict[tuple[str, int | None], list[float]] = {}
     for place, error in found.items():
-        restarted = found.get(place._replace(strategy="restart", nor=None))
+        restarted = found.get(place._replace(strategy=RESTART.name, nor=None))
         if error > 0 and restarted:
             ratios.setdefault((place.strategy, place.nor), []).append(error / restarted)
     return {variant: statistics.geometric_mean(values) for variant, values in ratios.items()}
@@ -144,8 +145,9 @@ def nor_errors(results: Results, mark: str) -> dict[tuple[str, int | None], floa
 
 def tile_errors(results: Results, mark: str) -> dict[tuple[int], float]:
     """Errors at a mark relative to the mean over tile sizes with the same edit, strategy, NoR and bounces, by
-    tile size; means are geometric. Restarting is left out: every step of it goes over the whole picture."""
-    found = {place: e for place, e in errors(results, mark).items() if place.strategy != "restart" and e > 0}
+    tile size; means are geometric. A strategy without a NoR is left out: every step of it goes over the whole
+    picture."""
+    found = {place: e for place, e in errors(results, mark).items() if place.nor is not None and e > 0}
     alike: dict[Place, list[float]] = {}
     for place, error in found.items():
         alike.setdefault(place._replace(tile_size=0), []).append(error)

@@ -121,7 +121,7 @@ def _task(
 
 def record_of(results: Results, edit: str, variant: Variant) -> Record | None:
     """The measurement of an edit under a variant."""
-    nor = None if variant.strategy == "restart" else variant.nor
+    nor = variant.nor if variant.uses_nor else None
     found = results.where(edit=edit, strategy=variant.strategy, nor=nor)
     return found[-1] if found else None
 
@@ -192,7 +192,7 @@ def _row(
             cells.append(Cell(pixels, f"{row['steps']} frames, error {row['normalized_rmse']:.4f}"))
     if edit in converged:
         cells.append(Cell(tone_map(converged[edit]), "converged"))
-    return Row("standard" if variant.strategy == "restart" else variant.label, cells) if cells else None
+    return Row(variant.label if variant.uses_nor else "standard", cells) if cells else None
 
 
 def table51(

@@ -19,6 +19,7 @@ from incpt.cli.options import (
     settings_from,
 )
 from incpt.core.errors import InputError, OutputError
+from incpt.core.settings import STRATEGIES
 from incpt.formats import registry
 from incpt.render.export import SUFFIXES, write_picture
 from incpt.render.session import Session, StepReport
@@ -32,7 +33,7 @@ def render(
     spp: Annotated[int, typer.Option(help="Samples per pixel.", min=1)] = 256,
     size: SizeOption = None,
     seed: SeedOption = None,
-    strategy: Annotated[str | None, typer.Option(help="restart or spiral.")] = None,
+    strategy: Annotated[str | None, typer.Option(help=f"{' or '.join(STRATEGIES)}.")] = None,
     max_bounces: BouncesOption = None,
     aovs: Annotated[
         bool, typer.Option("--aovs", help="Put object ids, normals, depth and base colours into the .exr.")

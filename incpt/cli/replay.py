@@ -33,7 +33,7 @@ def replay(
     edits_file: Annotated[Path, typer.Argument(help="Edit script (.toml).", show_default=False)],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for what comes out.")],
     strategy: Annotated[
-        list[str] | None, typer.Option(help="restart or spiral; may be repeated [default: both].")
+        list[str] | None, typer.Option(help=f"{' or '.join(STRATEGIES)}; may be repeated [default: all].")
     ] = None,
     nor: Annotated[
         list[int] | None, typer.Option(help="Repetitions of a tile; may be repeated [default: the scene's].")
@@ -49,12 +49,13 @@ def replay(
     scene = registry.load(scene_file)
     script = load_edits(edits_file, scene)
     settings = settings_from(scene, size=size, seed=seed, max_bounces=max_bounces)
-    compared = variants(strategy or STRATEGIES, nor or [settings.nor])
-    # A variant that cannot be is refused here, by the name of its option.
-    for variant in compared:
-        settings_from(
-            scene, size=None, strategy=variant.strategy, nor=variant.nor
-        )  # says which option is wrong
+    names, nors = strategy or STRATEGIES, nor or [settings.nor]
+    # What cannot be is refused here, by the name of its option.
+    for name in names:
+        settings_from(scene, size=None, strategy=name)
+    for one in nors:
+        settings_from(scene, size=None, nor=one)
+    compared = variants(names, nors)
     plan = Replay(scene, script, compared, settings, base_spp, reference_spp)
     if plan.left_out:
         what = f"{edits_file}: {plan.left_out} captures come after the next edit and are left out"

@@ -10,6 +10,7 @@ from typing import Any
 from incpt.core.errors import InputError
 
 STRATEGIES = ("restart", "spiral")
+"""Names of the strategies of `incpt.render.strategies`, so that scenes can be read without a device."""
 POINTS_OF_CHANGE = ("bounds", "pixel")
 MAX_IMAGE_PIXELS = 1 << 26
 """8,192 x 8,192: what fits the 32-bit plane indices of the kernels with room to spare."""
@@ -105,5 +106,5 @@ def _one_of(name: str, value: Any, choices: tuple[str, ...]) -> None:
         raise InputError(f"{name}: {value!r} is not known; choose one of {', '.join(choices)}")
 
 
-# Settings that change what a sample is worth, so that what was accumulated cannot be kept.
 PICTURE_SETTINGS = ("max_bounces", "transmission_bounces", "roulette_depth", "seed")
+"""Settings that change what a sample is worth, so that what was accumulated cannot be kept."""

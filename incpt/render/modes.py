@@ -9,6 +9,7 @@ INCREMENTAL  after a local edit: the spiral queue with a high NoR; each finished
 from __future__ import annotations
 
 from enum import Enum
+from typing import Protocol
 
 
 class Mode(Enum):
@@ -27,14 +28,23 @@ class Event(Enum):
     QUEUE_DONE = "queue done"
 
 
-def next_mode(mode: Mode, event: Event, strategy: str) -> Mode:
+class LocalChangePolicy(Protocol):
+    """What `next_mode` asks of a strategy."""
+
+    @property
+    def keeps_picture(self) -> bool:
+        """Whether a local change keeps what the film has and renders it anew tile by tile."""
+        ...
+
+
+def next_mode(mode: Mode, event: Event, strategy: LocalChangePolicy) -> Mode:
     """The mode after `event`; every answer starts a new queue, also where the mode stays the same.
 
-    `strategy` is one of `settings.STRATEGIES`. A local change during BASE starts over, because there is
-    no whole picture yet that could be kept; under "restart" every change does.
+    A local change during BASE starts over under every strategy, because there is no whole picture yet that
+    could be kept.
     """
     if event is Event.QUEUE_DONE:
         return Mode.REFINE
-    if event is Event.GLOBAL_CHANGE or strategy == "restart" or mode is Mode.BASE:
-        return Mode.BASE
-    return Mode.INCREMENTAL
+    if event is Event.LOCAL_CHANGE and mode is not Mode.BASE and strategy.keeps_picture:
+        return Mode.INCREMENTAL
+    return Mode.BASE

@@ -1,7 +1,8 @@
-"""Tiles: the grid over the image, the order in which they are rendered, and the plan of a step.
+"""Queues of tiles, and the plan of a step.
 
 The path buffer of a step has room for a number of *slots*, each for one copy of one tile with one path
-per pixel. `plan` fills them from a queue of tiles, each repeated NoR times (thesis, sections 3.1 to 3.4):
+per pixel. `plan_step` fills them from a queue of tiles, each repeated as often as the queue says: NoR times
+after a local edit (thesis, sections 3.1 to 3.4):
 
     tiles completed per step = slots / NoR     (400 x 400 pixels, tile 10, NoR 4: 1600 / 4 = 400)
 
@@ -11,6 +12,7 @@ The thesis prints 10 for that example; its formula, buffer / (tile area * NoR), 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -18,20 +20,7 @@ import numpy.typing as npt
 from incpt.core import layout
 from incpt.render.tiles import IntArray, TileGrid
 
-
-@dataclass(frozen=True, eq=False)
-class Queue:
-    """Tiles in the order in which they are rendered.
-
-    tiles     (N,) the order.
-    samples   paths per pixel of each tile: NoR times the sample rate. Each fills a slot.
-    replaces  whether a finished tile replaces what the film has of it, with samples counted from 0 (BASE,
-              INCREMENTAL), or is added to it and counts on from there (REFINE).
-    """
-
-    tiles: IntArray
-    samples: int
-    replaces: bool
+CountArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -43,12 +32,48 @@ class Cursor:
 
 
 @dataclass(frozen=True, eq=False)
+class Queue:
+    """Tiles in the order in which they are rendered.
+
+    tiles     (N,) the order; each tile at most once.
+    samples   (N,) paths per pixel of each of them, one at least. Each path per pixel fills a slot.
+    replaces  whether a finished tile replaces what the film has of it, with samples counted from 0 (BASE,
+              INCREMENTAL), or is added to it and counts on from there (REFINE).
+    """
+
+    tiles: IntArray
+    samples: CountArray
+    replaces: bool
+
+    @classmethod
+    def even(cls, tiles: IntArray, samples: int, replaces: bool) -> Queue:
+        """A queue with the same number of samples for each tile."""
+        return cls(tiles, np.full(len(tiles), samples, np.int64), replaces)
+
+    @cached_property
+    def ends(self) -> CountArray:
+        """(N,) the slots up to the end of each tile, itself included."""
+        return np.cumsum(self.samples)
+
+    @property
+    def slot_count(self) -> int:
+        """The slots that the whole queue fills."""
+        return int(self.ends[-1])
+
+    def slots_before(self, cursor: Cursor) -> int:
+        """The slots that are done where `cursor` stands."""
+        return (int(self.ends[cursor.tiles - 1]) if cursor.tiles else 0) + cursor.samples
+
+
+@dataclass(frozen=True, eq=False)
 class Plan:
     """One step: `slots` (layout.SLOT) says which tile and sample is in which slot, `finished` which tiles
-    are complete after it, in queue order; `cursor` is where the next step goes on."""
+    are complete after it, in queue order, and `finished_samples` how many samples each of them got; `cursor`
+    is where the next step goes on."""
 
     slots: npt.NDArray[np.void]
     finished: IntArray
+    finished_samples: CountArray
     cursor: Cursor
 
 
@@ -62,19 +87,19 @@ def plan_step(
     indices. Where a tile has more samples than there are slots, its groups follow in the next steps: FIRST
     marks the group that starts the tile, LAST the one that completes it.
     """
-    per_tile = queue.samples
-    begin = cursor.tiles * per_tile + cursor.samples
-    end = min(begin + slot_count, len(queue.tiles) * per_tile)
+    begin = queue.slots_before(cursor)
+    end = min(begin + slot_count, queue.slot_count)
     assert slot_count > 0 and begin < end, "a step needs a slot and a queue that is not done"
 
-    place = np.arange(cursor.tiles, (end - 1) // per_tile + 1, dtype=np.int64)
-    group_begin = np.maximum(place * per_tile, begin)
-    group_end = np.minimum((place + 1) * per_tile, end)
-    first_sample = group_begin - place * per_tile
-    completes = group_end == (place + 1) * per_tile
-    tiles = queue.tiles[place]
+    last = int(np.searchsorted(queue.ends, end))
+    place = slice(cursor.tiles, last + 1)
+    tiles, tile_end = queue.tiles[place], queue.ends[place]
+    tile_begin = tile_end - queue.samples[place]
+    group_begin, group_end = np.maximum(tile_begin, begin), np.minimum(tile_end, end)
+    first_sample = group_begin - tile_begin
+    completes = group_end == tile_end
 
-    groups = np.zeros(len(place), layout.SLOT)
+    groups = np.zeros(len(tiles), layout.SLOT)
     groups["tile_x"], groups["tile_y"] = grid.origin(tiles)
     groups["first_sample"] = first_sample if queue.replaces else first_sample + sample_counts[tiles]
     groups["group_first"] = group_begin - begin
@@ -87,8 +112,16 @@ def plan_step(
     return Plan(
         slots=np.repeat(groups, groups["group_count"]),
         finished=tiles[completes],
-        cursor=Cursor(*divmod(end, per_tile)),
+        finished_samples=queue.samples[place][completes],
+        cursor=Cursor(last + 1) if completes[-1] else Cursor(last, end - int(tile_begin[-1])),
     )
+
+
+def counts_after(queue: Queue, plan: Plan, counts: CountArray) -> CountArray:
+    """(grid.count,) the samples behind each tile after a step of `queue`, from those before it."""
+    after = counts.copy()
+    after[plan.finished] = plan.finished_samples + (0 if queue.replaces else counts[plan.finished])
+    return after
 
 
 def is_done(queue: Queue, cursor: Cursor) -> bool:

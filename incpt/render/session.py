@@ -8,7 +8,7 @@ often each is repeated, and whether a finished tile replaces or refines what the
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 
@@ -23,7 +23,8 @@ from incpt.render import tiles
 from incpt.render.film import Film, path_buffer_stride, tile_image
 from incpt.render.first_hits import Aovs
 from incpt.render.modes import Event, Mode, next_mode
-from incpt.render.plan import Cursor, Queue, is_done, plan_step
+from incpt.render.plan import Cursor, Queue, counts_after, is_done, plan_step
+from incpt.render.strategies import Situation, Strategy, strategy_of
 from incpt.render.wavefront import Wavefront
 from incpt.scene.change import Change, affected_objects, diff
 from incpt.scene.model import Object, Scene
@@ -70,6 +71,10 @@ class Session:
     device cannot do the work.
     """
 
+    _mode: Mode
+    _queue: Queue
+    _tile_spp: npt.NDArray[np.int64]
+
     def __init__(
         self,
         scene: Scene,
@@ -114,6 +119,10 @@ class Session:
         return self._cursor
 
     @property
+    def _strategy(self) -> Strategy:
+        return strategy_of(self.settings)
+
+    @property
     def tile_spp(self) -> npt.NDArray[np.int64]:
         """(count,) samples behind each tile; 0 where the old picture waits to be thrown away."""
         return self._tile_spp
@@ -131,13 +140,10 @@ class Session:
         self._wavefront.trace(self._tables, params, filled, paths, self._radiance)
         self._film.reduce(params, plan, filled, self._radiance)
         nonfinite = self._film.take_nonfinite()
-        if queue.replaces:
-            self._tile_spp[plan.finished] = queue.samples
-        else:
-            self._tile_spp[plan.finished] += queue.samples
+        self._tile_spp = counts_after(queue, plan, self._tile_spp)
         self._cursor = plan.cursor
         if is_done(queue, plan.cursor):
-            self._enter(next_mode(mode, Event.QUEUE_DONE, self.settings.strategy))
+            self._enter(next_mode(mode, Event.QUEUE_DONE, self._strategy))
         return StepReport(
             mode,
             plan.finished,
@@ -173,12 +179,11 @@ class Session:
         affected = changed
         if since is not None and not (drag := diff(since, scene)).is_global:
             affected = affected_objects(since, scene, drag) or changed
-        mode = next_mode(self._mode, Event.LOCAL_CHANGE, self.settings.strategy)
+        mode = next_mode(self._mode, Event.LOCAL_CHANGE, self._strategy)
         if change.is_global:
-            self._enter(next_mode(self._mode, Event.GLOBAL_CHANGE, self.settings.strategy))
+            self._enter(next_mode(self._mode, Event.GLOBAL_CHANGE, self._strategy))
         elif changed or (affected and mode is Mode.INCREMENTAL):
-            point = pixel if pixel is not None and self.settings.point_of_change == "pixel" else None
-            self._enter(mode, self._point_of_change(affected) if point is None else point)
+            self._enter(mode, tuple(affected), pixel)
         return change
 
     def restart(self) -> None:
@@ -257,7 +262,7 @@ class Session:
         # Tiles of any size serve; these keep neighbouring rays together.
         params["tile_size"] = RenderSettings.tile_size
         grid = tiles.TileGrid(width, height, RenderSettings.tile_size)
-        queue = Queue(tiles.base_queue(grid), 1, True)
+        queue = Queue.even(tiles.base_queue(grid), 1, True)
         plan = plan_step(grid, queue, Cursor(), grid.count, np.zeros(grid.count, np.int64))
         surface, object_ids = self._first_hits(plan.slots, params)
         surface = surface.reshape(7, height, width)
@@ -370,39 +375,16 @@ class Session:
     def _enter(
         self,
         mode: Mode,
-        point_px: tuple[float, float] | None = None,
+        affected: tuple[Object, ...] = (),
+        pixel: tuple[float, float] | None = None,
         order: npt.NDArray[np.int32] | None = None,
     ) -> None:
         self._mode = mode
         self._cursor = Cursor()
-        incremental = mode is Mode.INCREMENTAL
-        if order is None:
-            if incremental and point_px is not None:
-                order = tiles.spiral_queue(self._grid, point_px)
-            else:
-                order = tiles.base_queue(self._grid)
         if mode is Mode.BASE:
             self._tile_spp = np.zeros_like(self._tile_spp)
-        repetitions = self.settings.nor if incremental else self.settings.base_nor
-        self._queue = Queue(order, repetitions * self.settings.sample_rate, mode is not Mode.REFINE)
-
-    def _point_of_change(self, objects: Iterable[Object]) -> tuple[float, float]:
-        """Centre of the 2D bounding box of objects, of its visible part where there is one, in pixels."""
-        width, height = self.size
-        camera = self.scene.camera
-        frame = transform.camera_frame(
-            camera.position, camera.target, camera.up, camera.fov_y, width / height
-        )
-        corners = np.concatenate([transform.box_corners(obj.world_bounds) for obj in objects])
-        pixels, in_front = transform.project(corners, camera.position, frame, self.size)
-        if not in_front.any():
-            return width / 2, height / 2
-        low, high = pixels[in_front].min(axis=0), pixels[in_front].max(axis=0)
-        inner_low, inner_high = np.maximum(low, 0), np.minimum(high, [width, height])
-        if (inner_low < inner_high).all():
-            low, high = inner_low, inner_high
-        x, y = (low + high) / 2
-        return float(x), float(y)
+        situation = Situation(mode, self.settings, self._grid, self.scene, self._tile_spp, affected, pixel)
+        self._queue = self._strategy.queue(situation, order)
 
     def _params(self, size: tuple[int, int] | None = None) -> npt.NDArray[np.void]:
         width, height = self.size if size is None else size

@@ -24,6 +24,7 @@ from incpt.formats.edit_script import Edit, EditScript
 from incpt.picture.metrics import normalized_rmse, relative_mse
 from incpt.render.modes import Mode
 from incpt.render.session import Session, StepReport
+from incpt.render.strategies import RESTART, STRATEGIES_BY_NAME
 from incpt.scene.model import Scene
 
 FloatImage = npt.NDArray[np.float32]
@@ -32,25 +33,34 @@ OnStep = Callable[[str, StepReport], None]
 
 @dataclass(frozen=True)
 class Variant:
-    """A strategy with its NoR, which `restart` does not use."""
+    """A strategy with its NoR, which some strategies do not use."""
 
     strategy: str
     nor: int
 
     @property
+    def uses_nor(self) -> bool:
+        """Whether the NoR makes a difference."""
+        return STRATEGIES_BY_NAME[self.strategy].uses_nor
+
+    @property
     def label(self) -> str:
         """For people."""
-        return self.strategy if self.strategy == "restart" else f"{self.strategy}, NoR {self.nor}"
+        return f"{self.strategy}, NoR {self.nor}" if self.uses_nor else self.strategy
 
     @property
     def slug(self) -> str:
         """For file names."""
-        return self.strategy if self.strategy == "restart" else f"{self.strategy}{self.nor}"
+        return f"{self.strategy}{self.nor}" if self.uses_nor else self.strategy
 
 
 def variants(strategies: Sequence[str], nors: Sequence[int]) -> list[Variant]:
     """Every strategy with every NoR that makes a difference to it, in the given order, each once."""
-    every = [Variant(s, nor) for s in strategies for nor in (nors[:1] if s == "restart" else nors)]
+    every = [
+        Variant(name, nor)
+        for name in strategies
+        for nor in (nors if STRATEGIES_BY_NAME[name].uses_nor else nors[:1])
+    ]
     return list(dict.fromkeys(every))
 
 
@@ -145,7 +155,7 @@ class Replay:
         yield Converged(None, session.image())
         start = session.snapshot()
         other_seed = (self.settings.seed + 1) % (1 << 32)
-        settings = replace(self.settings, seed=other_seed, strategy="restart")
+        settings = replace(self.settings, seed=other_seed, strategy=RESTART.name)
         converging = Session(self.scene, settings=settings, device=device)
         for run in self.runs:
             references: dict[int, FloatImage] = {}

@@ -51,12 +51,14 @@ class TileCosts:
         """How many slots of `area` paths, from `cursor` on, take so long. `guess`: seconds of a path where
         there is no better knowledge."""
         guess = max(guess, self._last)
-        longest = 4 + int(8 * seconds / (guess * area * queue.samples))
-        ahead = self._seconds[queue.tiles[cursor.tiles : cursor.tiles + longest]]
+        least = int(queue.samples[cursor.tiles :].min())
+        place = slice(cursor.tiles, cursor.tiles + 4 + int(8 * seconds / (guess * area * least)))
+        ahead, samples = self._seconds[queue.tiles[place]], queue.samples[place]
         per_slot = np.where(np.isfinite(ahead), ahead, guess) * area
-        ends = np.cumsum(per_slot * queue.samples) - per_slot[0] * cursor.samples
+        ends = np.cumsum(per_slot * samples) - per_slot[0] * cursor.samples
         whole = int(np.searchsorted(ends, seconds, side="right"))
+        slots = int(samples[:whole].sum()) - cursor.samples
         if whole == len(ahead):
-            return whole * queue.samples - cursor.samples
-        begin = ends[whole] - per_slot[whole] * queue.samples
-        return whole * queue.samples - cursor.samples + int((seconds - begin) / per_slot[whole])
+            return slots
+        begin = ends[whole] - per_slot[whole] * samples[whole]
+        return slots + int((seconds - begin) / per_slot[whole])

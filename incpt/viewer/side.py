@@ -16,6 +16,7 @@ from incpt.device.device import Device
 from incpt.picture.metrics import normalized_rmse
 from incpt.render.modes import Event, Mode, next_mode
 from incpt.render.session import Session, StepReport, check_settings
+from incpt.render.strategies import STRATEGIES_BY_NAME
 from incpt.scene.change import affected_objects, diff
 from incpt.viewer.pace import Pace, TileCosts
 from incpt.viewer.view import Float32Image, Picture, View
@@ -143,7 +144,7 @@ class Side:
         if change.is_global:
             return True
         is_local = bool(affected_objects(session.scene, view.scene, change))
-        strategy = self.strategy or settings.strategy
+        strategy = STRATEGIES_BY_NAME[self.strategy or settings.strategy]
         return is_local and next_mode(session.mode, Event.LOCAL_CHANGE, strategy) is Mode.BASE
 
     def _settings(self, view: View, divisor: int) -> RenderSettings:
@@ -224,7 +225,7 @@ class Side:
         """Slots of a step of that length. A little more ends the queue where only a little is left of it."""
         session = self.session
         cursor, queue, settings = session.cursor, session.queue, session.settings
-        left = len(queue.tiles) * queue.samples - cursor.tiles * queue.samples - cursor.samples
+        left = queue.slot_count - queue.slots_before(cursor)
         if self.divisor > 1 and session.mode is Mode.BASE:
             slots = left
         else:

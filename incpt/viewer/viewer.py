@@ -28,6 +28,7 @@ from incpt.render.export import write_picture
 from incpt.render.first_hits import Aovs
 from incpt.render.modes import Mode
 from incpt.render.session import Session
+from incpt.render.strategies import RESTART
 from incpt.viewer.pace import Pace
 from incpt.viewer.side import COARSEST, Side
 from incpt.viewer.view import Float32Image, Frame, Picture, View
@@ -168,7 +169,7 @@ class Live:
         if not view.split:
             self._restarting = None
         elif self._restarting is None:
-            side = Side(view, self.device, "restart", self._clock)
+            side = Side(view, self.device, RESTART.name, self._clock)
             side.spent = self._main.spent
             self._restarting = side
 

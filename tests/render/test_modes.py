@@ -7,6 +7,7 @@ from itertools import product
 import pytest
 
 from incpt.render.modes import Event, Mode, next_mode
+from incpt.render.strategies import RESTART, STRATEGIES_BY_NAME
 
 BASE, REFINE, INCREMENTAL = Mode.BASE, Mode.REFINE, Mode.INCREMENTAL
 GLOBAL, LOCAL, DONE = Event.GLOBAL_CHANGE, Event.LOCAL_CHANGE, Event.QUEUE_DONE
@@ -27,10 +28,10 @@ SPIRAL = {
 
 @pytest.mark.parametrize(("mode", "event"), list(product(Mode, Event)))
 def test_spiral_transitions(mode: Mode, event: Event) -> None:
-    assert next_mode(mode, event, "spiral") is SPIRAL[mode, event]
+    assert next_mode(mode, event, STRATEGIES_BY_NAME["spiral"]) is SPIRAL[mode, event]
 
 
 @pytest.mark.parametrize("mode", list(Mode))
 @pytest.mark.parametrize(("event", "expected"), [(GLOBAL, BASE), (LOCAL, BASE), (DONE, REFINE)])
 def test_restart_starts_over_at_every_change(mode: Mode, event: Event, expected: Mode) -> None:
-    assert next_mode(mode, event, "restart") is expected
+    assert next_mode(mode, event, RESTART) is expected

@@ -91,7 +91,7 @@ def test_sample_rate_multiplies_samples(device: Device, converged: np.ndarray) -
 def test_order_of_tiles_does_not_matter(device: Device, converged: np.ndarray) -> None:
     session = Session(mixed_scene(), device=device)
     order = np.random.default_rng(5).permutation(base_queue(session.grid))
-    session._queue = Queue(order.astype(np.int32), 64, True)  # any order: the public ways offer two
+    session._queue = Queue.even(order.astype(np.int32), 64, True)  # any order: the public ways offer two
     session.render(64)
     assert_same(session.image(), converged)
 

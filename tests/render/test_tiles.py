@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from support.kernels import call
 
 from incpt.core.layout import PARAMS, SlotFlag
-from incpt.render.plan import Cursor, Queue, is_done, plan_step
+from incpt.render.plan import Cursor, Queue, counts_after, is_done, plan_step
 from incpt.render.tiles import TileGrid, base_queue, spiral_queue
 
 grids = st.builds(TileGrid, st.integers(1, 120), st.integers(1, 120), st.integers(1, 40))
@@ -119,11 +119,15 @@ def test_points_that_are_not_finite_mean_the_centre(point: tuple[float, float]) 
 
 def run_queue(grid: TileGrid, queue: Queue, slot_count: int, counts: np.ndarray) -> list[np.ndarray]:
     """Slots of all steps, with what holds for every step checked."""
-    steps, cursor, finished = [], Cursor(), []
+    steps, cursor, finished, slots_before = [], Cursor(), [], 0
+    now = counts
     while not is_done(queue, cursor):
         step = plan_step(grid, queue, cursor, slot_count, counts)
         check_groups(step.slots)
         assert 1 <= len(step.slots) <= slot_count
+        assert queue.slots_before(cursor) == slots_before
+        slots_before += len(step.slots)
+        now = counts_after(queue, step, now)
         assert len(step.slots) == slot_count or is_done(queue, step.cursor)
         finished += step.finished.tolist()
         last = step.slots["flags"] & SlotFlag.LAST > 0
@@ -131,7 +135,10 @@ def run_queue(grid: TileGrid, queue: Queue, slot_count: int, counts: np.ndarray)
         assert step.finished.tolist() == list(tiles_of_last)
         steps.append(step.slots)
         cursor = step.cursor
-    assert finished == queue.tiles.tolist()
+    assert finished == queue.tiles.tolist() and slots_before == queue.slot_count
+    np.testing.assert_array_equal(
+        now[queue.tiles], queue.samples + (0 if queue.replaces else counts[queue.tiles])
+    )
     return steps
 
 
@@ -151,35 +158,37 @@ def check_groups(slots: np.ndarray) -> None:
 @given(
     grids.filter(lambda grid: grid.count <= 60),
     near_points,
-    st.integers(1, 12),
-    st.integers(1, 3),
+    st.lists(st.integers(1, 30), min_size=1, max_size=4),
     st.integers(1, 50),
     st.booleans(),
     st.integers(0, 1000),
 )
 def test_every_tile_gets_its_samples_in_order(
-    grid: TileGrid, point: tuple[float, float], nor: int, rate: int, slots: int, replaces: bool, seed: int
+    grid: TileGrid, point: tuple[float, float], samples: list[int], slots: int, replaces: bool, seed: int
 ) -> None:
     counts = np.random.default_rng(seed).integers(0, 500, grid.count)
-    queue = Queue(spiral_queue(grid, point), nor * rate, replaces)
-    samples: dict[int, list[int]] = {tile: [] for tile in range(grid.count)}
-    for step in run_queue(grid, queue, slots * rate, counts):
+    wanted = np.resize(samples, grid.count)
+    queue = Queue(spiral_queue(grid, point), wanted[spiral_queue(grid, point)], replaces)
+    given: dict[int, list[int]] = {tile: [] for tile in range(grid.count)}
+    for step in run_queue(grid, queue, slots, counts):
         for tile, slot, place in zip(tile_numbers(grid, step), step, range(len(step)), strict=True):
             start = 0 if replaces else int(counts[tile])
             group_end = int(slot["first_sample"] + slot["group_count"])
             flags = SlotFlag(int(slot["flags"]))
             assert (SlotFlag.FIRST in flags) == (slot["first_sample"] == start)
-            assert (SlotFlag.LAST in flags) == (group_end == start + nor * rate)
+            assert (SlotFlag.LAST in flags) == (group_end == start + wanted[tile])
             assert (SlotFlag.REPLACE in flags) == replaces
-            samples[tile].append(int(slot["first_sample"]) + place - int(slot["group_first"]))
-    for tile, indices in samples.items():
+            given[tile].append(int(slot["first_sample"]) + place - int(slot["group_first"]))
+    for tile, indices in given.items():
         start = 0 if replaces else int(counts[tile])
-        assert indices == list(range(start, start + nor * rate))
+        assert indices == list(range(start, start + wanted[tile]))
 
 
 def test_tiles_per_step_is_the_formula_of_the_thesis() -> None:
     grid = TileGrid(400, 400, 10)
-    step = plan_step(grid, Queue(base_queue(grid), 4, True), Cursor(), grid.count, np.zeros(grid.count, int))
+    step = plan_step(
+        grid, Queue.even(base_queue(grid), 4, True), Cursor(), grid.count, np.zeros(grid.count, int)
+    )
     assert len(step.finished) == 400 * 400 // (10 * 10 * 4) == 400
     assert step.cursor == Cursor(400, 0)
 
@@ -187,7 +196,7 @@ def test_tiles_per_step_is_the_formula_of_the_thesis() -> None:
 def test_plan_worked_by_hand() -> None:
     # 3 tiles of 5 samples in steps of 7 slots: 5 + 2, then 3 + 4, then the last one.
     grid = TileGrid(30, 10, 10)
-    queue, counts = Queue(np.array([1, 0, 2], np.int32), 5, True), np.zeros(3, int)
+    queue, counts = Queue.even(np.array([1, 0, 2], np.int32), 5, True), np.zeros(3, int)
     first = plan_step(grid, queue, Cursor(), 7, counts)
     assert first.slots["tile_x"].tolist() == [10] * 5 + [0] * 2
     assert first.slots["first_sample"].tolist() == [0] * 7
@@ -206,7 +215,7 @@ def test_plan_worked_by_hand() -> None:
 
 def test_one_tile_over_many_steps() -> None:
     grid = TileGrid(10, 10, 10)
-    queue = Queue(base_queue(grid), 256, True)
+    queue = Queue.even(base_queue(grid), 256, True)
     steps = run_queue(grid, queue, 100, np.zeros(1, int))
     assert [len(step) for step in steps] == [100, 100, 56]
     assert [int(step["flags"][0]) for step in steps] == [5, 4, 6]
@@ -215,7 +224,7 @@ def test_one_tile_over_many_steps() -> None:
 def test_refining_counts_on_from_each_tile() -> None:
     grid = TileGrid(30, 10, 10)
     counts = np.array([256, 7, 0])
-    step = plan_step(grid, Queue(base_queue(grid), 2, False), Cursor(), 6, counts)
+    step = plan_step(grid, Queue.even(base_queue(grid), 2, False), Cursor(), 6, counts)
     assert step.slots["first_sample"].tolist() == [256, 256, 7, 7, 0, 0]
     assert step.slots["flags"].tolist() == [3] * 6
 
@@ -242,7 +251,7 @@ def test_pixels_of_a_tile_come_in_squares_or_rows(tile_size: int, in_squares: bo
 def test_planning_a_4k_image_is_quick() -> None:
     grid = TileGrid(3840, 2160, 16)
     counts = np.zeros(grid.count, int)
-    queue = Queue(spiral_queue(grid, (1e6, -1e6)), 1, True)
+    queue = Queue.even(spiral_queue(grid, (1e6, -1e6)), 1, True)
 
     def best(work: Callable[[], object]) -> float:
         seconds = []
