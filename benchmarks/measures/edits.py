@@ -20,6 +20,7 @@ from incpt.core.settings import RenderSettings
 from incpt.device.device import Device
 from incpt.formats.edit_script import Edit
 from incpt.render import tiles
+from incpt.render.film import RADIANCE
 from incpt.render.modes import Mode
 from incpt.render.plan import Cursor, Queue
 from incpt.render.session import Session, Snapshot
@@ -113,7 +114,8 @@ class EditBench:
         sums[:3] = np.moveaxis(image, 2, 0) * np.float32(self.base_spp)
         sums[3] = self.base_spp
         return Snapshot(
-            self.scene, settings, sums, np.full(grid.count, self.base_spp, np.int64), Mode.REFINE,
+            self.scene, settings, {RADIANCE.name: sums}, np.full(grid.count, self.base_spp, np.int64),
+            Mode.REFINE,
             Queue.even(tiles.base_queue(grid), settings.base_nor * settings.sample_rate, False),
             Cursor(),
         )  # fmt: skip

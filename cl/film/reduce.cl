@@ -1,14 +1,27 @@
 #include "path/tile.cl"
 
-// Adds up the repetitions of each tile and puts the sums into the film.
+// How many floats a sample has.
+#ifndef CHANNELS
+#define CHANNELS 3
+#endif
+
+// What is summed up of a sample.
+#ifdef SQUARES
+#define SUMMED(value) ((value) * (value))
+#else
+#define SUMMED(value) (value)
+#endif
+
+// Adds up the repetitions of each tile and puts the sums into one pass of the film.
 //
-// One work-item for each pixel of each group of slots; `groups` holds the first slot of each. Film and
-// `pending` have four planes: sum of red, green, blue, and the number of samples. A tile whose repetitions
-// take several steps is kept in `pending` until its last one, so that the film shows finished tiles only.
-// Samples that are not finite count as black and are counted.
+// One work-item does one pixel of one group of slots; `groups` holds the first slot of each group. `samples`
+// is the path buffer, in which the pass begins at plane `first_plane`. `film` and `pending` have CHANNELS
+// planes of sums, and one of the number of samples. A tile whose repetitions take several steps is kept in
+// `pending` until its last one, so that the film shows finished tiles only. A sample with a float that is not
+// finite counts as zero, and `nonfinite` counts it.
 __kernel void reduce(const Params params, const uint group_total, __global const uint *groups,
-                     __global const Slot *slots, __global const float *radiance, __global float *pending,
-                     __global float *film, __global uint *nonfinite) {
+                     __global const Slot *slots, __global const float *samples, const uint first_plane,
+                     __global float *pending, __global float *film, __global uint *nonfinite) {
     uint tile_pixels = params.tile_size * params.tile_size;
     uint group = (uint)get_global_id(0) / tile_pixels;
     if (group >= group_total)
@@ -22,17 +35,23 @@ __kernel void reduce(const Params params, const uint group_total, __global const
 
     uint count = slot->group_count;
     uint begin = slot->group_first * tile_pixels + tile_place(&params, at) * count;
-    float sum[3] = {0.0f, 0.0f, 0.0f};
+    // Loops over the channels are unrolled by order: else PoCL leaves the sums in memory, and the whole
+    // kernel takes four to eight times as long.
+    float sum[CHANNELS] = {0.0f};
     uint bad = 0u;
     for (uint i = begin; i < begin + count; i++) {
-        float r = radiance[i], g = radiance[params.buffer_stride + i],
-              b = radiance[2u * params.buffer_stride + i];
-        // x - x is 0 for finite numbers alone.
-        int finite = (r - r == 0.0f) & (g - g == 0.0f) & (b - b == 0.0f);
+        float value[CHANNELS];
+        int finite = 1;
+#pragma unroll
+        for (uint channel = 0u; channel < CHANNELS; channel++) {
+            value[channel] = samples[(first_plane + channel) * params.buffer_stride + i];
+            // x - x is 0 for finite numbers alone.
+            finite &= value[channel] - value[channel] == 0.0f;
+        }
         bad += !finite;
-        sum[0] += finite ? r : 0.0f;
-        sum[1] += finite ? g : 0.0f;
-        sum[2] += finite ? b : 0.0f;
+#pragma unroll
+        for (uint channel = 0u; channel < CHANNELS; channel++)
+            sum[channel] += finite ? SUMMED(value[channel]) : 0.0f;
     }
     if (bad)
         atomic_add(nonfinite, bad);
@@ -40,9 +59,9 @@ __kernel void reduce(const Params params, const uint group_total, __global const
     uint pixels = params.width * params.height;
     uint pixel = y * params.width + x;
     uint flags = slot->flags;
-    for (uint plane = 0u; plane < 4u; plane++) {
+    for (uint plane = 0u; plane <= CHANNELS; plane++) {
         uint place = plane * pixels + pixel;
-        float value = plane < 3u ? sum[plane] : (float)count;
+        float value = plane < CHANNELS ? sum[plane] : (float)count;
         value += flags & SLOT_FIRST ? 0.0f : pending[place];
         if (flags & SLOT_LAST)
             film[place] = value + (flags & SLOT_REPLACE ? 0.0f : film[place]);

@@ -1,13 +1,22 @@
-// The film's picture: sums divided by counts, as interleaved red, green, blue and 1 (0 and black where
-// there is no sample yet).
+// How many floats a pixel of the pass has.
+#ifndef CHANNELS
+#define CHANNELS 3
+#endif
+
+// The picture of one pass of the film: its sums, divided by the number of samples unless KEEP_SUMS, and after
+// them 1, interleaved; all are 0 where there is no sample yet. `film` has planes as cl/film/reduce.cl fills
+// them.
 __kernel void resolve(const uint pixels, __global const float *film, __global float *image) {
     uint pixel = (uint)get_global_id(0);
     if (pixel >= pixels)
         return;
-    float count = film[3u * pixels + pixel];
+    float count = film[CHANNELS * pixels + pixel];
+#ifdef KEEP_SUMS
+    float scale = count > 0.0f ? 1.0f : 0.0f;
+#else
     float scale = count > 0.0f ? 1.0f / count : 0.0f;
-    image[4u * pixel] = film[pixel] * scale;
-    image[4u * pixel + 1u] = film[pixels + pixel] * scale;
-    image[4u * pixel + 2u] = film[2u * pixels + pixel] * scale;
-    image[4u * pixel + 3u] = count > 0.0f ? 1.0f : 0.0f;
+#endif
+    for (uint channel = 0u; channel < CHANNELS; channel++)
+        image[(CHANNELS + 1u) * pixel + channel] = film[channel * pixels + pixel] * scale;
+    image[(CHANNELS + 1u) * pixel + CHANNELS] = count > 0.0f ? 1.0f : 0.0f;
 }

@@ -1,47 +1,101 @@
-"""The film: sums of radiance with the number of samples behind each pixel.
+"""The film: what the paths brought, added up over the picture, with the number of samples behind each pixel.
 
-Division happens in `resolve`, so tiles may have different counts. A finished tile either replaces what
-the film has of it or is added; one that is under way waits in `pending`, so that nobody sees half of it.
+A film has named passes; radiance is one of them. Each holds sums, which `resolve` divides by the number of
+samples, so that tiles may differ in it. A finished tile either replaces what a pass has of it or is added;
+one that is under way waits in `pending`, so that nobody sees half of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
 from functools import partial
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
-from incpt.core import layout
 from incpt.device.device import BUILD_SIZES, Device
 from incpt.render.plan import Plan
 from incpt.render.tiles import TileGrid
 
-_PLANES = 4  # red, green, blue, samples
+Float32Array = npt.NDArray[np.float32]
+
+
+class Accumulation(Enum):
+    """What a pass adds up; values are features of cl/film/reduce.cl."""
+
+    SUM = ()
+    SQUARES = ("SQUARES",)
+
+
+class Resolution(Enum):
+    """What the picture of a pass is; values are features of cl/film/resolve.cl."""
+
+    MEAN = ()
+    SUM = ("KEEP_SUMS",)
+
+
+@dataclass(frozen=True)
+class FilmPass:
+    """One of the things that a film holds of each pixel.
+
+    name          by which its picture is asked for.
+    channels      the floats that each path brings for it, as planes of the path buffer.
+    accumulation  what is added up of them.
+    resolution    what the picture is made of these sums.
+    """
+
+    name: str
+    channels: int
+    accumulation: Accumulation = Accumulation.SUM
+    resolution: Resolution = Resolution.MEAN
+
+
+RADIANCE = FilmPass("radiance", 3)
+"""Red, green and blue, as `Session.image` shows them."""
+
+
+def plane_count(passes: Sequence[FilmPass]) -> int:
+    """The planes that the passes need in the path buffer, where they lie one after the other."""
+    return sum(one.channels for one in passes)
 
 
 class Film:
-    """Accumulation over an image of `width` x `height` pixels, on the device; black at first."""
+    """Accumulation over a picture of `width` x `height` pixels, on the device; black at first. No two passes
+    may have the same name.
 
-    def __init__(self, device: Device, width: int, height: int) -> None:
-        self.device, self.width, self.height = device, width, height
-        nbytes = 4 * _PLANES * width * height
-        self._sums, self._pending = device.empty(nbytes), device.empty(nbytes)
-        self._image = device.empty(nbytes)
+    It counts the samples behind what it *shows*, pixel by pixel and for each pass, since a strategy may give
+    pixels or passes different numbers. Which sample comes next does not follow from that count: after a
+    change that starts the picture over the film still shows the old one. So `Progress.tile_spp` counts the
+    samples of the scene as it is now, on the host, where steps are planned without a read. Both agree
+    wherever a tile shows that scene.
+    """
+
+    def __init__(
+        self, device: Device, width: int, height: int, passes: tuple[FilmPass, ...] = (RADIANCE,)
+    ) -> None:
+        self.device, self.width, self.height, self.passes = device, width, height, passes
         self._nonfinite = device.empty(4)
-        device.fill(self._sums, 0, nbytes)
         device.fill(self._nonfinite, 0, 4)
+        first_planes = accumulate((one.channels for one in passes), initial=0)
+        self._layers = {
+            one.name: _Layer(device, one, first, width * height)
+            for one, first in zip(passes, first_planes, strict=False)
+        }
+        assert len(self._layers) == len(passes), "passes of a film need different names"
 
-    def reduce(self, params: npt.NDArray[np.void], plan: Plan, slots: cl.Buffer, radiance: cl.Buffer) -> None:
-        """Put the paths of a step, `radiance` in the order of its `slots`, into the film."""
+    def reduce(self, params: npt.NDArray[np.void], plan: Plan, slots: cl.Buffer, samples: cl.Buffer) -> None:
+        """Put the paths of a step into the film: `samples` holds what they brought, in the order of `slots`,
+        a plane of params["buffer_stride"] floats for each channel of each pass."""
         groups = np.unique(plan.slots["group_first"]).astype(np.uint32)
         size = len(groups) * int(params["tile_size"]) ** 2
-        self._launch(
-            "reduce", size, params, np.uint32(len(groups)), self.device.upload(groups), slots, radiance,
-            self._pending, self._sums, self._nonfinite,
-        )  # fmt: skip
+        first_slots = self.device.upload(groups)
+        for layer in self._layers.values():
+            layer.reduce(size, params, np.uint32(len(groups)), first_slots, slots, samples, self._nonfinite)
 
     def take_nonfinite(self) -> int:
         """Samples that were not finite since the last call; they count as black."""
@@ -50,40 +104,76 @@ class Film:
             self.device.fill(self._nonfinite, 0, 4)
         return count
 
-    def _launch(self, name: str, size: int, *args: Any) -> None:
-        self.device.launch(self.device.kernel(name), size, *args)
-
-    def idle_launches(self, params: npt.NDArray[np.void], radiance: cl.Buffer) -> list[Callable[[], None]]:
+    def idle_launches(self, params: npt.NDArray[np.void], samples: cl.Buffer) -> list[Callable[[], None]]:
         """The launches of the film's kernels, each with nothing to do; see `Device.built`."""
         nothing, none = np.uint32(0), self._nonfinite
-        arguments = {
-            "reduce": (params, nothing, none, none, radiance, self._pending, self._sums, none),
-            "resolve": (nothing, self._sums, self._image),
-        }
-        return [
-            partial(self._launch, name, size, *arguments[name]) for name in arguments for size in BUILD_SIZES
-        ]
+        launches: list[Callable[[], None]] = []
+        for layer in self._layers.values():
+            launches += [
+                partial(layer.reduce, size, params, nothing, none, none, samples, none)
+                for size in BUILD_SIZES
+            ]
+            launches += [partial(layer.resolve, size, nothing) for size in BUILD_SIZES]
+        return launches
 
-    def image(self) -> npt.NDArray[np.float32]:
-        """(height, width, 4) mean radiance, linear; alpha is 0 where there is no sample yet."""
-        pixels = self.width * self.height
-        self._launch("resolve", pixels, np.uint32(pixels), self._sums, self._image)
-        return self.device.read(self._image, np.empty((self.height, self.width, _PLANES), np.float32))
+    def image(self, name: str = RADIANCE.name) -> Float32Array:
+        """(height, width, channels + 1) the picture of a pass, for radiance its mean, linear; the last
+        channel is 1, or 0 where there is no sample yet."""
+        layer, pixels = self._layers[name], self.width * self.height
+        layer.resolve(pixels, np.uint32(pixels))
+        image = np.empty((self.height, self.width, layer.film_pass.channels + 1), np.float32)
+        return self.device.read(layer.image, image)
 
-    def sums(self) -> npt.NDArray[np.float32]:
-        """(4, height, width) the sums of red, green and blue, and the number of samples."""
-        return self.device.read(self._sums, np.empty((_PLANES, self.height, self.width), np.float32))
+    def sums(self) -> dict[str, Float32Array]:
+        """(channels + 1, height, width) of each pass: the sums of its channels, and the number of samples."""
+        found = {}
+        for name, layer in self._layers.items():
+            planes = np.empty((layer.film_pass.channels + 1, self.height, self.width), np.float32)
+            found[name] = self.device.read(layer.sums, planes)
+        return found
 
-    def restore(self, sums: npt.NDArray[np.float32]) -> None:
-        """Make the film hold what `sums` returned of one of the same size."""
-        self.device.write(self._sums, sums)
+    def restore(self, sums: Mapping[str, Float32Array]) -> None:
+        """Make the film hold what `sums` returned of one of the same size; a pass that is not among them
+        stays as it is."""
+        for name in sums.keys() & self._layers.keys():
+            self.device.write(self._layers[name].sums, sums[name])
+
+
+class _Layer:
+    """The buffers of one pass, over `pixels` pixels; its channels begin at `first_plane` of the path
+    buffer."""
+
+    def __init__(self, device: Device, film_pass: FilmPass, first_plane: int, pixels: int) -> None:
+        self.device, self.film_pass, self._first_plane = device, film_pass, np.uint32(first_plane)
+        nbytes = 4 * (film_pass.channels + 1) * pixels
+        self.sums, self._pending, self.image = (device.empty(nbytes) for _ in range(3))
+        device.fill(self.sums, 0, nbytes)
+
+    def reduce(
+        self,
+        size: int,
+        params: npt.NDArray[np.void],
+        group_total: np.uint32,
+        groups: cl.Buffer,
+        slots: cl.Buffer,
+        samples: cl.Buffer,
+        nonfinite: cl.Buffer,
+    ) -> None:
+        """Launch cl/film/reduce.cl over `size` work-items."""
+        self._launch(
+            "reduce", self.film_pass.accumulation.value, size, params, group_total, groups, slots, samples,
+            self._first_plane, self._pending, self.sums, nonfinite,
+        )  # fmt: skip
+
+    def resolve(self, size: int, pixels: np.uint32) -> None:
+        """Launch cl/film/resolve.cl over `size` work-items."""
+        self._launch("resolve", self.film_pass.resolution.value, size, pixels, self.sums, self.image)
+
+    def _launch(self, name: str, features: tuple[str, ...], size: int, *args: Any) -> None:
+        channels = (f"CHANNELS {self.film_pass.channels}",)
+        self.device.launch(self.device.kernel(name, features=(*channels, *features)), size, *args)
 
 
 def tile_image(grid: TileGrid, per_tile: npt.NDArray[np.integer]) -> npt.NDArray[np.int64]:
     """(height, width) a value per tile, spread over the pixels."""
     return np.asarray(per_tile[grid.tile_of_pixels()], np.int64)
-
-
-def path_buffer_stride(slot_count: int, tile_size: int) -> int:
-    """Floats per plane of a path buffer for `slot_count` slots, and room where idle lanes may write."""
-    return slot_count * tile_size**2 + layout.WORK_GROUP_SIZE

@@ -8,7 +8,7 @@ often each is repeated, and whether a finished tile replaces or refines what the
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 
@@ -20,7 +20,7 @@ from incpt.core.errors import DeviceError, InputError
 from incpt.core.settings import PICTURE_SETTINGS, RenderSettings
 from incpt.device.device import Device
 from incpt.render import tiles
-from incpt.render.film import Film, path_buffer_stride, tile_image
+from incpt.render.film import Film, tile_image
 from incpt.render.first_hits import Aovs
 from incpt.render.modes import Event, Mode, next_mode
 from incpt.render.plan import Cursor, Queue, counts_after, is_done, plan_step
@@ -52,11 +52,12 @@ class StepReport:
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """A picture on the host and where its session stood; see `Session.snapshot`."""
+    """A picture on the host and where its session stood; see `Session.snapshot`. `sums` is what the film
+    held, as `Film.sums` returns it."""
 
     scene: Scene
     settings: RenderSettings
-    sums: npt.NDArray[np.float32]
+    sums: Mapping[str, npt.NDArray[np.float32]]
     tile_spp: npt.NDArray[np.int64]
     mode: Mode
     queue: Queue
@@ -354,7 +355,7 @@ class Session:
 
     def _stride_of_settings(self) -> int:
         check_settings(self.settings)
-        return path_buffer_stride(self._slot_count(), self.settings.tile_size)
+        return _path_buffer_stride(self._slot_count(), self.settings.tile_size)
 
     def _resize_path_buffer(self, stride: int) -> None:
         if stride != self._buffer_stride:
@@ -365,7 +366,7 @@ class Session:
         """Make room for so many slots; returns for how many there is, one at least."""
         area = self.settings.tile_size**2
         slots = max(1, min(slots, (_MOST_PATH_FLOATS // 3 - layout.WORK_GROUP_SIZE) // area))
-        stride = path_buffer_stride(slots, self.settings.tile_size)
+        stride = _path_buffer_stride(slots, self.settings.tile_size)
         if stride > self._buffer_stride:
             # Room to spare, since callers come back for a little more each time.
             with suppress(DeviceError):
@@ -421,12 +422,16 @@ def _one_slot() -> npt.NDArray[np.void]:
 def check_settings(settings: RenderSettings) -> None:
     """Raises InputError where a step of the settings is larger than kernels can address."""
     slots = _slot_count(settings)
-    if 3 * path_buffer_stride(slots, settings.tile_size) > _MOST_PATH_FLOATS:
+    if 3 * _path_buffer_stride(slots, settings.tile_size) > _MOST_PATH_FLOATS:
         most = (_MOST_PATH_FLOATS // 3 - layout.WORK_GROUP_SIZE) // settings.tile_size**2
         raise InputError(
             f"sample_rate: a step of {slots:,} slots is more than the {most:,} that can be "
             f"addressed; choose a smaller sample_rate or slots_per_step"
         )
+
+
+def _path_buffer_stride(slots: int, tile_size: int) -> int:
+    return slots * tile_size**2 + layout.WORK_GROUP_SIZE
 
 
 def _slot_count(settings: RenderSettings) -> int:
