@@ -23,6 +23,7 @@ from incpt.render import tiles
 from incpt.render.film import RADIANCE
 from incpt.render.modes import Mode
 from incpt.render.plan import Cursor, Queue
+from incpt.render.progress import Progress
 from incpt.render.session import Session, Snapshot
 from incpt.render.strategies import strategy_of
 from incpt.scene.model import Scene
@@ -113,12 +114,10 @@ class EditBench:
         sums = np.empty((4, *image.shape[:2]), np.float32)
         sums[:3] = np.moveaxis(image, 2, 0) * np.float32(self.base_spp)
         sums[3] = self.base_spp
-        return Snapshot(
-            self.scene, settings, {RADIANCE.name: sums}, np.full(grid.count, self.base_spp, np.int64),
-            Mode.REFINE,
-            Queue.even(tiles.base_queue(grid), settings.base_nor * settings.sample_rate, False),
-            Cursor(),
-        )  # fmt: skip
+        queue = Queue.even(tiles.base_queue(grid), settings.base_nor * settings.sample_rate, False)
+        tile_spp = np.full(grid.count, self.base_spp, np.int64)
+        progress = Progress(settings, grid, Mode.REFINE, queue, Cursor(), tile_spp)
+        return Snapshot(self.scene, progress, {RADIANCE.name: sums})
 
     def reference(self, scene: Scene, settings: RenderSettings, note: Note) -> FloatImage:
         """The converged picture of an edited scene. Of another seed than the sessions': else what they keep
@@ -147,7 +146,7 @@ class EditBench:
 
     def _at(self, start: Snapshot) -> Session:
         if self._session is None:
-            self._session = Session(start.scene, settings=start.settings, device=self.device)
+            self._session = Session(start.scene, settings=start.progress.settings, device=self.device)
         self._session.restore(start)
         return self._session
 

@@ -7,6 +7,7 @@ host nor the size of a launch tells them apart.
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -60,14 +61,16 @@ class OrderedSession(Session):
     def trace_seconds(self, slots: npt.NDArray[np.void], slot_width_px: int) -> float:
         """How long it takes to trace the paths of `slots`, which are on the device by then."""
         paths = len(slots) * slot_width_px**2
-        wanted = -(-paths // self.settings.tile_size**2)
-        room = self._reserve_slots(wanted)
-        assert room == wanted, f"{paths:,} paths do not fit the memory of the device"
-        params = self._params()
+        tile_size = self.settings.tile_size
+        wanted = -(-paths // tile_size**2)
+        path_buffer = self._state.path_buffer.grown(self.device, wanted, tile_size)
+        assert path_buffer.room(tile_size) >= wanted, f"{paths:,} paths do not fit the memory of the device"
+        self._state = replace(self._state, path_buffer=path_buffer)
+        params = self._params(path_buffer)
         params["tile_size"] = slot_width_px
         filled = self.device.upload(slots)
         self.device.finish()
         began = time.perf_counter()
-        self._wavefront.trace(self._tables, params, filled, paths, self._radiance)
+        self._wavefront.trace(self._tables, params, filled, paths, path_buffer.floats)
         self.device.finish()
         return time.perf_counter() - began

@@ -1,4 +1,8 @@
-"""What the rays through pixel centres meet first."""
+"""What the rays through pixel centres meet first: auxiliary images, and picking.
+
+These rays are not jittered, so that a pixel has one object and an outline does not flicker. Auxiliary images
+of the jittered samples of the picture itself are passes of the film; see `film`.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,17 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+
+from incpt.core import layout
+from incpt.core.settings import RenderSettings
+from incpt.render import tiles
+from incpt.render.params import launch_params
+from incpt.render.plan import Cursor, Queue, plan_step
+from incpt.render.wavefront import Wavefront
+from incpt.tables.scene_tables import SceneTables
+
+_SURFACE_PLANES = 7
+"""Shading normal, distance, base colour: see cl/film/first_hits.cl."""
 
 
 @dataclass(frozen=True)
@@ -17,3 +32,75 @@ class Aovs:
     normal: npt.NDArray[np.float32]
     depth: npt.NDArray[np.float32]
     albedo: npt.NDArray[np.float32]
+
+
+def first_hits(
+    tracer: Wavefront,
+    tables: SceneTables,
+    settings: RenderSettings,
+    size: tuple[int, int],
+    rows: tuple[int, int] | None = None,
+) -> Aovs:
+    """The auxiliary images of a picture of `size` (width, height), or of its rows from the first of `rows` up
+    to the second only."""
+    width, whole_height = size
+    params = launch_params(tables, settings, size)
+    top, bottom = (0, whole_height) if rows is None else rows
+    height = bottom - top
+    # The rows are a picture of their own, of a camera that looks a little up or down.
+    camera = params["camera"]
+    camera["forward"] += (1 - (top + bottom) / whole_height) * camera["up"]
+    camera["up"] *= height / whole_height
+    params["height"] = height
+    # Tiles of any size serve; these keep neighbouring rays together.
+    params["tile_size"] = RenderSettings.tile_size
+    grid = tiles.TileGrid(width, height, RenderSettings.tile_size)
+    queue = Queue.even(tiles.base_queue(grid), 1, True)
+    plan = plan_step(grid, queue, Cursor(), grid.count, np.zeros(grid.count, np.int64))
+    surface, object_ids = _traced(tracer, tables, plan.slots, params)
+    surface = surface.reshape(_SURFACE_PLANES, height, width)
+    return Aovs(
+        object_ids.reshape(height, width),
+        np.ascontiguousarray(np.moveaxis(surface[:3], 0, 2)),
+        surface[3],
+        np.ascontiguousarray(np.moveaxis(surface[4:], 0, 2)),
+    )
+
+
+def object_at(
+    tracer: Wavefront, tables: SceneTables, settings: RenderSettings, point: tuple[float, float]
+) -> str | None:
+    """The name of the object at a point (x, y) from the top left, in units of the picture, or None."""
+    params = launch_params(tables, settings)
+    camera = params["camera"]
+    # A picture of one pixel, whose centre is the point.
+    camera["forward"] += (2 * point[0] - 1) * camera["right"] + (1 - 2 * point[1]) * camera["up"]
+    params["width"] = params["height"] = params["tile_size"] = 1
+    _, object_ids = _traced(tracer, tables, one_slot(), params)
+    index = int(object_ids[0])
+    return tables.scene.objects[index].name if index >= 0 else None
+
+
+def one_slot() -> npt.NDArray[np.void]:
+    """(1,) layout.SLOT: a single path for each pixel of the tile at the top left."""
+    slot = np.zeros(1, layout.SLOT)
+    slot["group_count"] = 1
+    return slot
+
+
+def _traced(
+    tracer: Wavefront, tables: SceneTables, slots: npt.NDArray[np.void], params: npt.NDArray[np.void]
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]:
+    """(_SURFACE_PLANES * pixels,) and (pixels,) as cl/film/first_hits.cl fills them."""
+    device = tracer.device
+    pixels = int(params["width"]) * int(params["height"])
+    paths = len(slots) * int(params["tile_size"]) ** 2
+    params["pixel_center"] = 1
+    params["buffer_stride"] = paths + layout.WORK_GROUP_SIZE
+    surface, object_ids = device.empty(4 * _SURFACE_PLANES * pixels), device.empty(4 * pixels)
+    radiance = device.empty(12 * (paths + layout.WORK_GROUP_SIZE))
+    tracer.first_hits(tables, params, device.upload(slots), paths, surface, object_ids, radiance)
+    return (
+        device.read(surface, np.empty(_SURFACE_PLANES * pixels, np.float32)),
+        device.read(object_ids, np.empty(pixels, np.int32)),
+    )

@@ -6,6 +6,8 @@ A strategy has three jobs, and a session asks it for nothing else:
 2. the *samples* of each tile in that queue,
 3. how what a step traced is *merged* into the film, and which picture the film then shows.
 
+What each of them may use stands at its method.
+
 Strategies are found by name in `STRATEGIES_BY_NAME`; nobody else compares names. They keep no state of their
 own, because a session that meets an error goes back to the values that it had before: what a strategy has to
 remember belongs into the film (a pass of its own) or into the queue (a subclass of `Queue`), which comes back
@@ -15,19 +17,33 @@ to it as `Situation.queue`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Protocol
 
 import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
 
 from incpt.core import transform
 from incpt.core.settings import RenderSettings
 from incpt.render import tiles
+from incpt.render.film import RADIANCE, Film, FilmPass, Float32Array
 from incpt.render.modes import Mode
-from incpt.render.plan import CountArray, Queue
+from incpt.render.plan import CountArray, Plan, Queue
 from incpt.render.tiles import IntArray, TileGrid
+from incpt.render.wavefront import Wavefront
 from incpt.scene.camera import Camera
 from incpt.scene.model import Object, Scene
+from incpt.tables.scene_tables import SceneTables
+
+
+class FilmSums(Protocol):
+    """What a strategy may read of a film."""
+
+    def sums(self) -> Mapping[str, Float32Array]:
+        """(channels + 1, height, width) of each pass: the sums of its channels, and the number of samples."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +54,10 @@ class Situation:
     settings  those of the session.
     grid      the tiles of its picture.
     scene     the scene as it is now.
-    counts    (grid.count,) samples of that scene behind each tile.
-    affected  the objects that a local change affects, as they were and as they are; in a drag, as they were
+    tile_spp  (grid.count,) samples of that scene behind each tile.
+    film      what is in the film. To read its sums waits for the device; no strategy reads them in every
+    step. affected  the objects that a local change affects, as they were and as they are; in a drag, as they
+    were
               before the drag. Empty where no object changed.
     pixel     the point of change that came with the edit, (x, y) from the top left, or None.
     queue     the queue before this one; None at first.
@@ -49,21 +67,46 @@ class Situation:
     settings: RenderSettings
     grid: TileGrid
     scene: Scene
-    counts: CountArray
+    tile_spp: CountArray
+    film: FilmSums
     affected: tuple[Object, ...] = ()
     pixel: tuple[float, float] | None = None
     queue: Queue | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class TracedStep:
+    """A step whose paths are traced.
+
+    tracer   what traced them, and could trace others.
+    tables   the scene that they were traced in.
+    params   () layout.PARAMS they were traced with.
+    plan     which tile and sample is in which slot.
+    slots    the slots of the plan, on the device.
+    samples  the path buffer: what the paths brought, a plane for each channel of each pass of the film. The
+    tracer
+             fills those of radiance.
+    """
+
+    tracer: Wavefront
+    tables: SceneTables
+    params: npt.NDArray[np.void]
+    plan: Plan
+    slots: cl.Buffer
+    samples: cl.Buffer
 
 
 class Strategy(ABC):
     """What happens to the picture after a change; see the module for the three jobs.
 
     name           by which settings choose it.
+    passes         what the film has to hold for it; radiance is the first of them.
     uses_nor       whether the setting `nor` makes a difference.
     keeps_picture  whether a local change keeps what the film has; see `modes.next_mode`.
     """
 
     name: ClassVar[str]
+    passes: ClassVar[tuple[FilmPass, ...]] = (RADIANCE,)
     uses_nor: ClassVar[bool]
     keeps_picture: ClassVar[bool]
 
@@ -83,6 +126,17 @@ class Strategy(ABC):
         """Job 3: whether a finished tile replaces what the film has of it, or is added to it. By default only
         refinement adds."""
         return situation.mode is not Mode.REFINE
+
+    def merge(self, step: TracedStep, film: Film) -> None:
+        """Job 3: put what a step traced into the film. It may launch kernels of its own over all that the
+        step and the film hold, such as paths in an older scene from the same slots, whose results go into
+        passes of its own. By default each pass gets its planes of the path buffer."""
+        film.reduce(step.params, step.plan, step.slots, step.samples)
+
+    def image(self, film: Film) -> Float32Array:
+        """Job 3: (height, width, 4) the picture that the film shows: mean radiance, linear, and 1 where there
+        ever was a sample, else 0. It may launch kernels of its own, once for each picture that is shown."""
+        return film.image()
 
     def queue(self, situation: Situation, order: IntArray | None = None) -> Queue:
         """The queue that the three jobs make together; `order` keeps an order that is there already."""

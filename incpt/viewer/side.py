@@ -15,7 +15,8 @@ from incpt.core.settings import PICTURE_SETTINGS, RenderSettings
 from incpt.device.device import Device
 from incpt.picture.metrics import normalized_rmse
 from incpt.render.modes import Event, Mode, next_mode
-from incpt.render.session import Session, StepReport, check_settings
+from incpt.render.path_buffer import check_settings
+from incpt.render.session import Session, StepReport
 from incpt.render.strategies import STRATEGIES_BY_NAME
 from incpt.scene.change import affected_objects, diff
 from incpt.viewer.pace import Pace, TileCosts
@@ -101,7 +102,10 @@ class Side:
         if view.point is not None:
             pixel = (view.point[0] * settings.size[0], view.point[1] * settings.size[1])
         grid, queue = session.grid, session.queue
-        session.edit(view.scene, pixel, since if divisor == 1 else None, settings)
+        since = since if divisor == 1 else None
+        session.edit(view.scene, pixel, since, settings)
+        if since is not None and view.before is None and session.queue.tiles is queue.tiles:
+            session.end_drag(since, pixel)
         if divisor > 1 and session.mode is Mode.INCREMENTAL:
             session.restart()
         self.view, self.divisor = view, divisor

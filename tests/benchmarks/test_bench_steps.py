@@ -109,8 +109,9 @@ def test_orders_bring_the_same_radiance() -> None:
     for order in ORDERS:
         slots, width_px = ordered_slots(order, session.grid, tiles, 8)
         assert session.trace_seconds(slots, width_px) > 0
-        planes = np.empty((3, session._buffer_stride), np.float32)
-        session.device.read(session._radiance, planes)
+        buffer = session._state.path_buffer
+        planes = np.empty((buffer.planes, buffer.stride), np.float32)
+        session.device.read(buffer.floats, planes)
         radiance = planes[:, : len(slots) * width_px**2]
         sums[order] = np.zeros((3, 64, 96))
         x, y, _ = np.array(_places(slots, width_px)).T

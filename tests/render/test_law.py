@@ -88,6 +88,15 @@ edits = st.one_of(
 )
 
 
+def assert_counts_agree(session: Session) -> None:
+    """The host counts samples of the scene as it is now, the film those behind what it shows; both are the
+    same wherever the film shows that scene, and only there the host counts any."""
+    counts = session._state.film.sums()["radiance"][3]
+    spp = session.spp()
+    np.testing.assert_array_equal(counts[spp > 0], spp[spp > 0])
+    assert session.mode is Mode.BASE or (spp > 0).all()
+
+
 def apply_all(
     device: Device, strategy: str, sequence: list[tuple[Edit, int]], slots: int | None
 ) -> tuple[Session, Scene]:
@@ -97,8 +106,10 @@ def apply_all(
     for edit, steps in sequence:
         scene = edit(scene)
         session.edit(scene)
+        assert_counts_agree(session)
         for _ in range(steps):
             session.step()
+            assert_counts_agree(session)
     return session, scene
 
 

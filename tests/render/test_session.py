@@ -91,7 +91,8 @@ def test_sample_rate_multiplies_samples(device: Device, converged: np.ndarray) -
 def test_order_of_tiles_does_not_matter(device: Device, converged: np.ndarray) -> None:
     session = Session(mixed_scene(), device=device)
     order = np.random.default_rng(5).permutation(base_queue(session.grid))
-    session._queue = Queue.even(order.astype(np.int32), 64, True)  # any order: the public ways offer two
+    queue = Queue.even(order.astype(np.int32), 64, True)  # any order: the public ways offer two
+    session._state = replace(session._state, progress=replace(session.progress, queue=queue))
     session.render(64)
     assert_same(session.image(), converged)
 
@@ -111,8 +112,9 @@ def test_paths_go_in_squares_where_they_go_through_trees(device: Device) -> None
         scene = Scene(Camera((0, 0, 0), (0, 0, -1)), Environment(), materials, objects)
         session = Session(scene, settings=small_settings(size=(8, 8), tile_size=8), device=device)
         session.step()
-        planes = np.empty((3, session._buffer_stride), np.float32)
-        lit = session.device.read(session._radiance, planes)[0, :64] > 0
+        buffer = session._state.path_buffer
+        planes = np.empty((buffer.planes, buffer.stride), np.float32)
+        lit = session.device.read(buffer.floats, planes)[0, :64] > 0
         y, x = np.divmod(np.arange(64), 8)
         order = np.lexsort((x % edge, y % edge, x // edge, y // edge))
         assert (lit == (x[order] < 4)).all()
@@ -230,14 +232,19 @@ def test_steps_of_a_drag_are_measured_from_where_it_began(device: Device) -> Non
     assert session.mode is Mode.INCREMENTAL
 
 
-def test_same_scene_again_ends_a_drag_with_the_whole_nor(device: Device) -> None:
+def test_end_of_a_drag_repeats_with_the_whole_nor(device: Device) -> None:
     start = mixed_scene(nor=4)
     session = rendered(device, start, 1)
     end = moved(start)
     session.edit(end, since=start)
     session.render(6)
-    session.edit(end, since=start, settings=replace(session.settings, nor=16))
+    session.configure(replace(session.settings, nor=16))
+    assert session.mode is Mode.REFINE
+    session.end_drag(start)
     assert session.mode is Mode.INCREMENTAL and session.cursor == Cursor()
+    alone = rendered(device, start, 1)
+    alone.edit(end)
+    np.testing.assert_array_equal(session.queue.tiles, alone.queue.tiles)
     session.render(16)
     assert_same(session.image(), rendered(device, end, 16).image())
 
@@ -249,13 +256,25 @@ def test_end_of_a_drag_starts_nothing_over(device: Device) -> None:
     session.edit(end, since=start)
     session.step()
     cursor = session.cursor
-    session.edit(end, since=start)
+    session.end_drag(start)
     assert session.mode is Mode.BASE and session.cursor == cursor
     turned = start.with_camera(fov_y=50.0)
     session.edit(turned, since=start)
     session.render(2)
-    session.edit(turned, since=start)
+    session.end_drag(start)
     assert session.mode is Mode.REFINE and (session.spp() == 2).all()
+    session.end_drag(turned)
+    assert session.mode is Mode.REFINE and (session.spp() == 2).all()
+
+
+def test_same_scene_again_is_no_edit(device: Device) -> None:
+    start = mixed_scene(nor=4)
+    session = rendered(device, start, 1)
+    end = moved(start)
+    session.edit(end, since=start)
+    session.render(6)
+    session.edit(end, since=start)
+    assert session.mode is Mode.REFINE and (session.spp() >= 6).all()
 
 
 def test_nor_may_change_before_the_first_step_of_an_edit(device: Device) -> None:
@@ -440,7 +459,7 @@ def test_failed_configure_keeps_settings_and_picture(
 def test_step_beyond_32_bits_is_refused(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     session = rendered(device, mixed_scene(), 2)
     # As a device with memory enough would do.
-    monkeypatch.setattr(device, "empty", lambda _: session._radiance)
+    monkeypatch.setattr(device, "empty", lambda _: session._state.path_buffer.floats)
     largest = ((1 << 32) // 3 - 64) // 64
     session.configure(replace(session.settings, slots_per_step=largest // 4096, sample_rate=4096))
     with pytest.raises(InputError, match=r"^sample_rate: a step of .* slots is more"):

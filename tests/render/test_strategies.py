@@ -1,32 +1,45 @@
-"""What each strategy plans, without a device."""
+"""What each strategy plans, without a device, and that a session takes a strategy that it does not know."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NoReturn
 
 import numpy as np
 import pytest
 from support.small_scenes import mixed_scene
 
 from incpt.core.settings import STRATEGIES, RenderSettings
+from incpt.device.device import Device
+from incpt.render.film import RADIANCE, Film, FilmPass, Resolution
 from incpt.render.modes import Mode
+from incpt.render.plan import CountArray
+from incpt.render.session import Session
 from incpt.render.strategies import (
     RESTART,
     STRATEGIES_BY_NAME,
     Situation,
+    Strategy,
+    TracedStep,
     point_of_change,
     strategy_of,
 )
-from incpt.render.tiles import TileGrid, base_queue, spiral_queue
+from incpt.render.tiles import IntArray, TileGrid, base_queue, spiral_queue
 
 SETTINGS = RenderSettings(size=(44, 28), tile_size=8, nor=5, base_nor=2, sample_rate=3)
 GRID = TileGrid(44, 28, 8)
 SPIRAL = STRATEGIES_BY_NAME["spiral"]
 
 
+class NoFilm:
+    """No strategy that stands here reads the film."""
+
+    def sums(self) -> NoReturn:
+        raise AssertionError("the film is read")
+
+
 def situation(mode: Mode, **changes: object) -> Situation:
-    counts = np.zeros(GRID.count, np.int64)
-    made = Situation(mode, SETTINGS, GRID, mixed_scene(), counts)
+    made = Situation(mode, SETTINGS, GRID, mixed_scene(), np.zeros(GRID.count, np.int64), NoFilm())
     return replace(made, **changes)  # type: ignore[arg-type]
 
 
@@ -68,3 +81,71 @@ def test_an_order_that_is_there_is_kept() -> None:
     order = base_queue(GRID)[::-1].copy()
     queue = SPIRAL.queue(situation(Mode.INCREMENTAL), order)
     assert queue.tiles is order and (queue.samples == 15).all()
+
+
+TRACES = FilmPass("traces", 1, resolution=Resolution.SUM)
+
+
+class Probe(Strategy):
+    """It needs all that the protocol has: a pass of its own, written by itself, an order that leaves tiles
+    out, and samples for each tile that follow from what the film holds."""
+
+    name = "probe"
+    uses_nor = True
+    keeps_picture = True
+    passes = (RADIANCE, TRACES)
+
+    def order(self, situation: Situation) -> IntArray:
+        order = base_queue(situation.grid)
+        return order[::2] if situation.mode is Mode.INCREMENTAL else order[::-1].copy()
+
+    def samples(self, situation: Situation, order: IntArray) -> CountArray:
+        if situation.mode is not Mode.INCREMENTAL:
+            return super().samples(situation, order)
+        assert situation.queue is not None and situation.affected
+        count = situation.film.sums()["traces"][1]
+        return 1 + order % 3 + int(count.max())
+
+    def merge(self, step: TracedStep, film: Film) -> None:
+        device, stride = film.device, int(step.params["buffer_stride"])
+        device.write(step.samples, np.full(stride, 2.0, np.float32), offset=4 * 3 * stride)
+        super().merge(step, film)
+
+
+def test_session_takes_a_strategy_with_needs_of_its_own(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(STRATEGIES_BY_NAME, "probe", Probe())
+    monkeypatch.setattr("incpt.core.settings.STRATEGIES", (*STRATEGIES, "probe"))
+    scene = mixed_scene(strategy="probe", slots_per_step=7)
+    session = Session(scene, device=device)
+    session.render(2)
+    order = base_queue(session.grid)
+    assert session.queue.tiles[0] == order[-1]
+    edited = scene.with_object("red cube", position=(0.2, 0.5, 0.4))
+    session.edit(edited)
+    np.testing.assert_array_equal(session.queue.samples, 1 + order[::2] % 3 + 2)
+    while session.mode is Mode.INCREMENTAL:
+        session.step()
+    np.testing.assert_array_equal(session.tile_spp[::2], 3 + order[::2] % 3)
+    assert (session.tile_spp[1::2] == 2).all()
+    # Its own pass was accumulated as radiance was, and comes back with a snapshot.
+    sums = session._state.film.sums()
+    np.testing.assert_array_equal(sums["traces"][1], session.spp())
+    np.testing.assert_array_equal(sums["traces"][0], 2 * session.spp())
+    snapshot = session.snapshot()
+    session.restart()
+    session.step()
+    session.restore(snapshot)
+    np.testing.assert_array_equal(session._state.film.sums()["traces"], sums["traces"])
+    # What is kept of each finished tile is what a fresh render has.
+    for count in (3, 4, 5):
+        fresh = Session(edited, settings=replace(scene.settings, strategy="restart"), device=device)
+        fresh.render(count)
+        here = (session.spp() == count) & np.isin(session.grid.tile_of_pixels(), order[::2])
+        assert here.any()
+        np.testing.assert_allclose(session.image()[here], fresh.image()[here], rtol=1e-3, atol=1e-4)
+    # A strategy without that pass starts a film without it.
+    session.configure(replace(session.settings, strategy="restart"))
+    assert session.mode is Mode.BASE and list(session._state.film.sums()) == ["radiance"]
+    assert session._state.path_buffer.planes == 3
