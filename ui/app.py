@@ -21,7 +21,7 @@ from incpt.ui.viewport.viewport import Viewport
 from incpt.ui.window import Window
 from incpt.ui.workspace import Workspace
 from incpt.viewer.threaded import ThreadedRenderer
-from incpt.viewer.viewer import Frame
+from incpt.viewer.view import Frame
 
 _IDLE_SECONDS = 0.5
 """How long the loop sleeps without an event: notices go away and autosaves are made in between."""

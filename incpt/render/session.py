@@ -50,7 +50,7 @@ class StepReport:
 
 @dataclass(frozen=True, eq=False)
 class SessionState:
-    """All of a session that changes but the scene on the device. An edit makes another one, which is put in
+    """All of a session that changes. An edit makes another one, which is put in
     its place once all that can fail is done."""
 
     progress: Progress

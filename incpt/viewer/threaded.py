@@ -1,7 +1,7 @@
 """The renderer as the window sees it: views and requests go in, messages come out, nothing blocks.
 
-`ThreadedRenderer` runs a `Live` in a thread of its own. The device is opened in there too, so that the window
-stands before the first kernel is compiled. PyOpenCL lets other threads run while the device works.
+`ThreadedRenderer` runs a `Viewer` in a thread of its own. The device is opened in there too, so that the
+window stands before the first kernel is compiled. PyOpenCL lets other threads run while the device works.
 """
 
 from __future__ import annotations
@@ -12,143 +12,25 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
-from typing import Protocol
 
 from incpt.core.errors import DeviceError, InputError, OutputError, one_line
 from incpt.device.device import Device
 from incpt.scene.model import Scene
-from incpt.viewer.viewer import Frame, Live, RenderingStoppedError, View
+from incpt.viewer.renderer import Building, Export, Exported, Message, Pick, Picked, Pin, Problem, Request
+from incpt.viewer.view import Frame, View
+from incpt.viewer.viewer import RenderingStoppedError, Viewer
 
 _NICER = 5
 
 DRAWING_SECONDS = 0.025
 """The longest that a drag's next step waits for the window to draw the last one."""
 FIGURES_SECONDS = 0.1
-"""Between two Frames with the same picture; a window redraws for each."""
-
-
-@dataclass(frozen=True)
-class Pick:
-    """Which object is at `point`, in units of the image from the top left? `additive` comes back as it is."""
-
-    point: tuple[float, float]
-    additive: bool = False
-
-
-@dataclass(frozen=True)
-class Export:
-    """Write the picture: .exr is linear radiance, `aovs` adds first-hit layers; .png is tone-mapped as
-    `exposure` and `curve` say."""
-
-    path: Path
-    aovs: bool = False
-    exposure: float = 0.0
-    curve: str = "agx"
-
-
-@dataclass(frozen=True)
-class Pin:
-    """Compare with the picture as it is now, or no longer."""
-
-    on: bool
-
-
-@dataclass(frozen=True)
-class Restart:
-    """Throw away what was accumulated."""
-
-
-Request = Pick | Export | Pin | Restart
-
-
-@dataclass(frozen=True)
-class Building:
-    """`done` of `total` steps of building the kernels are done."""
-
-    done: int
-    total: int
-
-
-@dataclass(frozen=True)
-class Picked:
-    """The answer to a Pick: the object's name, or None."""
-
-    point: tuple[float, float]
-    name: str | None
-    additive: bool
-
-
-@dataclass(frozen=True)
-class Exported:
-    """The picture is in the file."""
-
-    path: Path
-
-
-@dataclass(frozen=True)
-class Problem:
-    """One line that names the place and the fix. After a fatal one the renderer does nothing more."""
-
-    text: str
-    fatal: bool = False
-
-
-Message = Frame | Building | Picked | Exported | Problem
-
-
-class Renderer(Protocol):
-    """What the editor needs of a renderer. No call blocks but `close`."""
-
-    def show(self, view: View) -> None:
-        """Render this from now on; of several calls the last one counts."""
-        ...
-
-    def request(self, request: Request) -> None:
-        """Do this between two steps, in the order of the calls."""
-        ...
-
-    def poll(self) -> list[Message]:
-        """What came since the last call; of Frames, and of Buildings, the latest only."""
-        ...
-
-    def close(self) -> None:
-        """Stop after the step under way and free the device."""
-        ...
-
-
-class NullRenderer:
-    """Renders nothing: for tests of the editor. It keeps the `views` and `requests` it is given; a Pick is
-    answered with `picks[point]` (None where there is no such point), and `messages` are polled next."""
-
-    def __init__(self) -> None:
-        self.views: list[View] = []
-        self.requests: list[Request] = []
-        self.picks: dict[tuple[float, float], str | None] = {}
-        self.messages: list[Message] = []
-        self.closed = False
-
-    def show(self, view: View) -> None:
-        self.views.append(view)
-
-    def request(self, request: Request) -> None:
-        self.requests.append(request)
-        if isinstance(request, Pick):
-            name = self.picks.get(request.point)
-            self.messages.append(Picked(request.point, name, request.additive))
-
-    def poll(self) -> list[Message]:
-        messages, self.messages = self.messages, []
-        return messages
-
-    def close(self) -> None:
-        self.closed = True
+"""The time between two Frames with the same picture, since a window redraws for each."""
 
 
 class ThreadedRenderer:
-    """A Live on `device` (what chooses one: see `Device`) in a thread. `wake` is called there whenever
+    """A Viewer on `device` (what chooses one: see `Device`) in a thread. `wake` is called there whenever
     messages are ready."""
 
     def __init__(
@@ -253,13 +135,13 @@ class ThreadedRenderer:
         self._wait_for_news(None)
         if self._view is None:
             return
-        live = Live(self._view, device, self._report_building)
+        viewer = Viewer(self._view, device, self._report_building)
         while not self._closing:
             for request in self._take_requests():
-                self._answer(live, request)
+                self._answer(viewer, request)
             view = self._view
             try:
-                frame = live.advance(view, partial(self._has_edit_after, view))
+                frame = viewer.advance(view, partial(self._has_edit_after, view))
             except RenderingStoppedError:
                 raise
             except (InputError, DeviceError, MemoryError) as error:
@@ -269,7 +151,7 @@ class ThreadedRenderer:
                 self._wait_for_news(view)
             elif self._is_worth_showing(frame):
                 self._post(frame)
-                if live.device.is_cpu:
+                if viewer.device.is_cpu:
                     self._let_draw(frame)
 
     def _let_draw(self, frame: Frame) -> None:
@@ -284,17 +166,17 @@ class ThreadedRenderer:
                 lambda: self._closing or bool(self._requests) or self._has_edit_after(view), DRAWING_SECONDS
             )
 
-    def _answer(self, live: Live, request: Request) -> None:
+    def _answer(self, viewer: Viewer, request: Request) -> None:
         try:
             if isinstance(request, Pick):
-                self._post(Picked(request.point, live.pick(request.point), request.additive))
+                self._post(Picked(request.point, viewer.pick(request.point), request.additive))
             elif isinstance(request, Export):
-                live.export(request.path, request.aovs, request.exposure, request.curve)
+                viewer.export(request.path, request.aovs, request.exposure, request.curve)
                 self._post(Exported(request.path))
             elif isinstance(request, Pin):
-                live.pin_reference(request.on)
+                viewer.pin_reference(request.on)
             else:
-                live.restart()
+                viewer.restart()
         except (InputError, DeviceError, OutputError, MemoryError) as error:
             self._post(Problem(_explain(error)))
 

@@ -1,52 +1,48 @@
 """What a viewer sees while the scene is edited, and how rendering stays responsive.
 
 A viewer hands in what it wants to see, a `View`, and calls `advance` over and over; each call does one
-bounded piece of work and returns the `Frame` to show. There is no thread in here and nothing waits.
+bounded piece of work and returns the `Frame` to show. There is no thread in here and nothing waits. What to
+do follows from `scheduler.next_work`, a pure function; this module does it.
 
-- A step takes about the time that the view asks for: its slots follow from what the same tiles took before.
-- Between two steps only the latest view counts. An edit is taken up once the one before it has been answered
-  by a finished tile (or, where everything starts over, by a whole picture), because otherwise a drag that is
-  faster than a tile would never show anything.
-- During a drag tiles are repeated less often, so that the region of the object follows soon. When it ends,
-  the spiral starts anew with the NoR of the settings.
-- Where a change makes the picture start over, and a whole picture does not fit a step, it is first rendered
-  with a half, a quarter ... of the pixels a side, until the view rests.
+Between two steps only the latest view counts. During a drag tiles are repeated less often, so that the region
+of the object follows soon; when it ends, the strategy starts anew with the NoR of the settings.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-
-import numpy as np
 
 from incpt.core.errors import DeviceError, InputError
 from incpt.device.device import Device
 from incpt.render.export import write_picture
-from incpt.render.first_hits import Aovs
 from incpt.render.modes import Mode
-from incpt.render.session import Session
+from incpt.render.path_buffer import check_settings
+from incpt.render.session import Session, StepReport
 from incpt.render.strategies import RESTART
+from incpt.viewer import scheduler
 from incpt.viewer.pace import Pace
-from incpt.viewer.side import COARSEST, Side
-from incpt.viewer.view import Float32Image, Frame, Picture, View
-
-__all__ = ["Frame", "Live", "Picture", "RenderingStoppedError", "View"]
-
-MOST_AHEAD = 2
-"""Steps that the answer to an edit may cost the other side of a split view in advance."""
-AOV_SHARE = 0.2
-"""Of the time of a step, for first-hit images."""
+from incpt.viewer.picture import FirstHitReader, PictureReader
+from incpt.viewer.scheduler import Follow, ReturnToFull, Side, Situation, Step
+from incpt.viewer.view import Float32Image, Frame, View
 
 
 class RenderingStoppedError(DeviceError):
     """A step failed, as opposed to an edit: the device can do no more."""
 
 
-class Live:
-    """Renders what a viewer wants to see on `device` (a Device, or what chooses one).
+@dataclass(frozen=True, eq=False)
+class _Seat:
+    """The session of a side, and what reads its picture."""
+
+    session: Session
+    reader: PictureReader
+
+
+class Viewer:
+    """Renders what somebody wants to see on `device` (a Device, or what chooses one).
 
     `on_build` is called with (done, total) while kernels are built, here and after an edit that needs others;
     what it raises comes through. `clock` gives seconds. Raises InputError and DeviceError as Session does.
@@ -61,25 +57,22 @@ class Live:
     ) -> None:
         self.device = device if isinstance(device, Device) else Device(device)
         self._on_build, self._clock = on_build, clock
-        self._view = view
         self._refused: View | None = None
-        self._main = Side(view, self.device, None, clock)
-        self._restarting: Side | None = None
         self._reference: Float32Image | None = None
         self._is_pinning = False
-        self._aovs: Aovs | None = None
-        self._aovs_of: tuple[object, ...] | None = None
-        self._aovs_wanted: tuple[object, ...] | None = None
-        self._bands: list[Aovs] = []
-        self._aov_pace = Pace(5e6 if self.device.is_cpu else 5e8)
         self._rest_is_shown = False
         self._step_seconds, self._speed = 0.0, 0.0
-        self._main.session.build(on_build)
+        side, seat = self._opened(view, None)
+        self._situation = Situation(view, (side,), (0.0,), clock())
+        self._seats: tuple[_Seat, ...] = (seat,)
+        pace = Pace(5e6 if self.device.is_cpu else 5e8)
+        self._first_hits = FirstHitReader(seat.session, pace, clock)
+        seat.session.build(on_build)
 
     @property
     def session(self) -> Session:
         """That of the chosen strategy; to look at."""
-        return self._main.session
+        return self._seats[-1].session
 
     def advance(self, view: View, has_edit_after: Callable[[], bool] = lambda: False) -> Frame | None:
         """Do one bounded piece of work towards `view` and return what there is to show; None: nothing to do,
@@ -89,17 +82,16 @@ class Live:
         What an edit or a setting raises (InputError, DeviceError, MemoryError) comes through once for a view;
         the last good one is rendered on. RenderingStoppedError: a step failed, nothing can go on.
         """
-        self._follow(view)
+        step = self._follow(view)
         try:
-            side, had_answer = self._next_side(), self._main.answered
-            if side is not None:
-                self._step(side)
+            had_answer = self._main.is_answered
+            if step is not None:
+                self._render(step)
                 if had_answer and has_edit_after():
                     return None
             elif self._rest_is_shown:
                 return None
-            has_aovs = not self._view.aovs or ((self._main.answered or side is None) and self._update_aovs())
-            self._rest_is_shown = side is None and has_aovs
+            self._rest_is_shown = self._has_first_hits(step is None) and step is None
             return self._frame(resting=self._rest_is_shown)
         except (DeviceError, MemoryError) as error:
             raise RenderingStoppedError(_explain(error)) from error
@@ -111,8 +103,9 @@ class Live:
 
     def restart(self) -> None:
         """Throw away what was accumulated; the picture stands until it is rendered anew."""
-        for side in self._sides:
-            side.restart()
+        for place, seat in enumerate(self._seats):
+            seat.session.restart()
+            self._note(place, scheduler.restarted(self._situation.sides[place], seat.session.progress))
         self._rest_is_shown = False
 
     def pin_reference(self, on: bool) -> None:
@@ -124,125 +117,144 @@ class Live:
     def export(self, path: str | Path, aovs: bool = False, exposure: float = 0.0, curve: str = "agx") -> None:
         """Write the picture of the chosen strategy at full resolution; see `write_picture`. Where it is not
         whole yet, that is done first."""
-        if self._main.divisor > 1:
-            self._main.return_to_full()
+        place, main = len(self._seats) - 1, self._main
+        if main.divisor > 1:
+            settings = scheduler.settings_of(main.view, main.strategy, main.whole, 1)
+            self._return_to_full(ReturnToFull(place, settings))
         while self.session.mode is Mode.BASE:
-            self._main.step(self._view.step_ms)
+            slots = scheduler.slots_of_step(self._main, self._situation.view.step_ms)
+            self._step(Step(place, slots, self._situation.spent))
         write_picture(Path(path), self.session, aovs, exposure, curve)
 
     # ------------------------------------------------------------------------------------ following the view
 
     @property
-    def _sides(self) -> tuple[Side, ...]:
-        return (self._main,) if self._restarting is None else (self._restarting, self._main)
+    def _main(self) -> Side:
+        return self._situation.main
 
-    def _follow(self, view: View) -> None:
-        if view is self._view or view is self._refused or view == self._refused:
-            view = self._view
-        elif view != self._view:
+    def _follow(self, view: View) -> Step | None:
+        """Do all that leads to the view but the rendering; returns the step that is to be rendered then."""
+        known = self._situation.view
+        if view is known or view is self._refused or view == self._refused:
+            view = known
+        elif view != known:
             self._rest_is_shown = False
         good: View | None = self._main.view
         try:
             self._split(view)
-            for side in self._sides:
-                if not side.shows(view) and (view.paused or side.may_change(view)):
-                    self._change(side, view)
-            good = self._main.full_view
-            for side in self._sides:
-                if side.divisor > 1 and side.answered and side.rests and not view.paused:
-                    side.return_to_full()
+            while True:
+                situation = replace(self._situation, view=view, now=self._clock())
+                work = scheduler.next_work(situation)
+                if isinstance(work, Follow):
+                    self._bring(work)
+                elif isinstance(work, ReturnToFull):
+                    good = self._main.full_view
+                    self._return_to_full(work)
+                else:
+                    self._situation = replace(self._situation, view=view)
+                    return work
         except (InputError, DeviceError, MemoryError) as error:
             if good is None:
                 raise RenderingStoppedError(_explain(error)) from error
             self._refused = view
-            self._view = replace(
+            shown = replace(
                 view,
                 scene=good.scene,
                 before=good.before,
                 resolution_scale=good.resolution_scale,
-                split=self._restarting is not None,
+                split=len(self._seats) > 1,
             )
+            self._situation = replace(self._situation, view=shown)
             raise
-        self._view = view
 
     def _split(self, view: View) -> None:
+        situation, seats = self._situation, self._seats
         if not view.split:
-            self._restarting = None
-        elif self._restarting is None:
-            side = Side(view, self.device, RESTART.name, self._clock)
-            side.spent = self._main.spent
-            self._restarting = side
+            self._seats = seats[-1:]
+            self._situation = replace(situation, sides=situation.sides[-1:], spent=situation.spent[-1:])
+        elif len(seats) == 1:
+            side, seat = self._opened(view, RESTART.name)
+            self._seats = (seat, *seats)
+            sides, spent = (side, *situation.sides), situation.spent * 2
+            self._situation = replace(situation, sides=sides, spent=spent)
 
-    def _change(self, side: Side, view: View) -> None:
-        # Beside a picture that is kept, one that starts over is to be seen as it is.
-        is_main = side is self._main
-        side.change(view, not view.paused and (is_main or self._main.divisor > 1))
-        side.session.build(self._on_build)
-        height_width = view.size[::-1]
+    def _opened(self, view: View, strategy: str | None) -> tuple[Side, _Seat]:
+        whole = Pace(1e6 if self.device.is_cpu else 5e7)
+        divisor = scheduler.fitting_divisor(view, whole, 1)
+        settings = scheduler.settings_of(view, strategy, whole, divisor)
+        session = Session(view.scene, settings=settings, device=self.device)
+        side = Side.opened(view, session.progress, whole, divisor, strategy)
+        return side, _Seat(session, PictureReader(session, self._clock))
+
+    def _bring(self, work: Follow) -> None:
+        """On an error everything stays as it was."""
+        session = self._seats[work.side].session
+        if work.divisor > 1:
+            side = self._situation.sides[work.side]
+            check_settings(scheduler.settings_of(work.view, side.strategy, side.whole, 1))
+        order = session.queue.tiles
+        session.edit(work.view.scene, work.pixel, work.since, work.settings)
+        # A drag often ends without another edit; where there is one, it has begun a new order already.
+        if work.ends_drag and work.since is not None and session.queue.tiles is order:
+            session.end_drag(work.since, work.pixel)
+        if work.divisor > 1 and session.mode is Mode.INCREMENTAL:
+            session.restart()
+        side = self._situation.sides[work.side]
+        self._note(work.side, scheduler.followed(side, work, session.progress, self._clock()))
+        session.build(self._on_build)
+        height_width = work.view.size[::-1]
         if self._reference is not None and self._reference.shape[:2] != height_width:
             self._reference = None
 
+    def _return_to_full(self, work: ReturnToFull) -> None:
+        session = self._seats[work.side].session
+        session.configure(work.settings)
+        side = self._situation.sides[work.side]
+        self._note(work.side, scheduler.returned_to_full(side, session.progress))
+
+    def _note(self, place: int, side: Side) -> None:
+        sides = self._situation.sides
+        self._situation = replace(self._situation, sides=(*sides[:place], side, *sides[place + 1 :]))
+
     # ------------------------------------------------------------------------------------ work
 
-    def _next_side(self) -> Side | None:
-        """Whose turn it is: equal time for both, and the answer to an edit first."""
-        view = self._view
-        if view.paused:
-            return None
-        waiting = [side for side in self._sides if not side.is_done(view.target_spp)]
-        if not waiting:
-            return None
-        behind = min(waiting, key=lambda side: side.spent)
-        ahead = self._main.spent - behind.spent
-        is_urgent = self._main in waiting and not self._main.answered
-        side = self._main if is_urgent and ahead < MOST_AHEAD * view.step_ms / 1e3 else behind
-        for other in self._sides:
-            if other not in waiting:
-                other.spent = max(other.spent, side.spent)
-        return side
-
-    def _step(self, side: Side) -> None:
-        report = side.step(self._view.step_ms)
-        if side is self._main:
-            self._step_seconds = report.seconds
-            speed = report.paths / report.seconds
+    def _render(self, step: Step) -> None:
+        report, seconds = self._step(step)
+        if step.side == len(self._seats) - 1:
+            self._step_seconds = seconds
+            speed = report.paths / seconds
             self._speed = speed if self._speed == 0 else 0.8 * self._speed + 0.2 * speed
 
-    def _update_aovs(self) -> bool:
-        """Some rows of the first hits of the scene that is shown; returns whether they are all there. While
-        it changes there are fewer of them than pixels, so that they come at once and cost little."""
-        main = self._main
-        scene, (width, height) = main.view.scene, main.view.size
-        rays = self._aov_pace.speed * self._view.step_ms / 1e3 * AOV_SHARE
-        divisor = 1
-        is_moving = not main.rests and not self._view.paused
-        while is_moving and divisor < COARSEST and width * height / divisor**2 > rays:
-            divisor *= 2
-        width, height = -(-width // divisor), -(-height // divisor)
-        wanted = (scene.camera, scene.objects, scene.materials, width, height)
-        if wanted == self._aovs_of:
-            return True
-        if wanted != self._aovs_wanted:
-            self._aovs_wanted, self._bands = wanted, []
-        top = sum(len(band.depth) for band in self._bands)
-        bottom = height if is_moving else min(top + max(1, int(rays / width)), height)
+    def _step(self, step: Step) -> tuple[StepReport, float]:
+        session = self._seats[step.side].session
         start = self._clock()
-        self._bands.append(self.session.aovs((width, height), (top, bottom)))
-        self._aov_pace.add(width * (bottom - top), self._clock() - start)
-        if bottom < height:
-            return False
-        self._aovs, self._aovs_of, self._bands = _joined(self._bands), wanted, []
-        self._aovs_wanted = None
-        return True
+        report = session.step(step.slots)
+        seconds = max(self._clock() - start, 1e-6)
+        side = self._situation.sides[step.side]
+        self._note(step.side, scheduler.stepped(side, report, seconds, session.progress))
+        spent = tuple(t + seconds * (place == step.side) for place, t in enumerate(step.spent))
+        self._situation = replace(self._situation, spent=spent)
+        return report, seconds
+
+    def _has_first_hits(self, is_idle: bool) -> bool:
+        """Whether all first hits are there that are wanted; some rows more of them, unless an edit waits for
+        its answer."""
+        view, main = self._situation.view, self._main
+        if not view.aovs:
+            return True
+        return (main.is_answered or is_idle) and self._first_hits.advance(view, main)
 
     def _frame(self, resting: bool) -> Frame:
-        main, view = self._main, self._view
+        main, view = self._main, self._situation.view
         if self._is_pinning and main.divisor == 1:
-            image = main.image(must_be_new=True)
+            image = self._seats[-1].reader.image(main, must_be_new=True)
             if image[..., 3].min() > 0:
                 self._reference, self._is_pinning = image[..., :3], False
-        pictures = tuple(side.picture(self._reference, resting) for side in self._sides)
-        if not main.shows(view):
+        pictures = tuple(
+            seat.reader.picture(side, self._reference, resting)
+            for seat, side in zip(self._seats, self._situation.sides, strict=True)
+        )
+        if not scheduler.shows(main, view):
             shown = main.view
             view = replace(
                 view, scene=shown.scene, before=shown.before, resolution_scale=shown.resolution_scale
@@ -254,16 +266,11 @@ class Live:
             step_seconds=self._step_seconds,
             paths_per_second=self._speed,
             device=self.device.name,
-            aovs=self._aovs if self._view.aovs else None,
-            nonfinite=sum(side.nonfinite for side in self._sides),
+            aovs=self._first_hits.aovs if view.aovs else None,
+            nonfinite=sum(side.nonfinite for side in self._situation.sides),
             resting=resting,
             is_pinned=self._reference is not None or self._is_pinning,
         )
-
-
-def _joined(bands: list[Aovs]) -> Aovs:
-    """First hits of rows that follow each other."""
-    return Aovs(*(np.concatenate([getattr(band, f.name) for band in bands]) for f in fields(Aovs)))
 
 
 def _explain(error: Exception) -> str:

@@ -33,8 +33,9 @@ from incpt.ui.rect import Rect
 from incpt.ui.viewport.viewport import Viewport
 from incpt.ui.widgets import places, theme
 from incpt.ui.workspace import Workspace
-from incpt.viewer.threaded import Message, NullRenderer, Renderer
-from incpt.viewer.viewer import Frame, Picture, View
+from incpt.viewer.renderer import Message, Renderer
+from incpt.viewer.view import Frame, Picture, View
+from support.null_renderer import NullRenderer
 
 WINDOW = (1600, 1900)
 """Tall enough that no panel has to be scrolled."""

@@ -9,27 +9,27 @@ from pathlib import Path
 from weakref import WeakKeyDictionary
 
 import pytest
+from support.null_renderer import NullRenderer
 from support.small_scenes import mixed_scene
 
 from incpt.core.errors import DeviceError
 from incpt.device.device import Device
 from incpt.render.session import Session
 from incpt.scene.model import Scene
-from incpt.viewer.threaded import (
+from incpt.viewer.renderer import (
     Building,
     Export,
     Exported,
     Message,
-    NullRenderer,
     Pick,
     Picked,
     Pin,
     Problem,
     Renderer,
     Restart,
-    ThreadedRenderer,
 )
-from incpt.viewer.viewer import Frame, View
+from incpt.viewer.threaded import ThreadedRenderer
+from incpt.viewer.view import Frame, View
 
 PATIENCE = 60.0
 

@@ -17,7 +17,9 @@ from incpt.device.device import Device
 from incpt.render.modes import Mode
 from incpt.render.session import Session, StepReport
 from incpt.scene.model import Scene
-from incpt.viewer.viewer import Frame, Live, View
+from incpt.viewer.pace import Pace
+from incpt.viewer.view import Frame, View
+from incpt.viewer.viewer import Viewer
 
 SLOW = 6e4
 """Paths a second with which the test picture (1,536 paths) does not fit a step of 10 ms."""
@@ -35,12 +37,12 @@ class Clock:
         return self.now
 
 
-MakeLive = Callable[..., tuple[Live, Clock]]
+MakeViewer = Callable[..., tuple[Viewer, Clock]]
 
 
 @pytest.fixture
-def make_live(device: Device, monkeypatch: pytest.MonkeyPatch) -> MakeLive:
-    def make(view: View, speed: float = SLOW) -> tuple[Live, Clock]:
+def make_viewer(device: Device, monkeypatch: pytest.MonkeyPatch) -> MakeViewer:
+    def make(view: View, speed: float = SLOW) -> tuple[Viewer, Clock]:
         clock = Clock(speed)
         step, edit = Session.step, Session.edit
 
@@ -56,7 +58,7 @@ def make_live(device: Device, monkeypatch: pytest.MonkeyPatch) -> MakeLive:
 
         monkeypatch.setattr(Session, "step", timed_step)
         monkeypatch.setattr(Session, "edit", counted_edit)
-        return Live(view, device, clock=clock), clock
+        return Viewer(view, device, clock=clock), clock
 
     return make
 
@@ -65,21 +67,21 @@ def view_of(scene: Scene, **changes: object) -> View:
     return View(scene, **{"step_ms": 10.0, **changes})  # type: ignore[arg-type]
 
 
-def frames_until_rest(live: Live, view: View, most: int = 2000) -> list[Frame]:
+def frames_until_rest(viewer: Viewer, view: View, most: int = 2000) -> list[Frame]:
     frames = []
     for _ in range(most):
-        frame = live.advance(view)
+        frame = viewer.advance(view)
         assert frame is not None
         frames.append(frame)
         if frame.resting:
-            assert live.advance(view) is None
+            assert viewer.advance(view) is None
             return frames
     raise AssertionError("does not come to rest")
 
 
-def run_to(live: Live, view: View, condition: Callable[[Frame], bool], most: int = 500) -> Frame:
+def run_to(viewer: Viewer, view: View, condition: Callable[[Frame], bool], most: int = 500) -> Frame:
     for _ in range(most):
-        frame = live.advance(view)
+        frame = viewer.advance(view)
         assert frame is not None
         if condition(frame):
             return frame
@@ -106,12 +108,12 @@ def turned(scene: Scene, fov_y: float) -> Scene:
 
 
 def test_starts_with_a_preview_and_converges_to_the_fresh_picture(
-    make_live: MakeLive, device: Device
+    make_viewer: MakeViewer, device: Device
 ) -> None:
     scene = mixed_scene(size=(176, 112))
-    live, _ = make_live(view_of(scene), speed=1e5)
+    viewer, _ = make_viewer(view_of(scene), speed=1e5)
     view = view_of(scene, target_spp=4)
-    frames = frames_until_rest(live, view)
+    frames = frames_until_rest(viewer, view)
     assert frames[0].is_preview and frames[0].pictures[0].image.shape[0] < 112
     assert (frames[0].pictures[0].image[..., 3] == 1).all()
     assert not any(frame.is_preview for frame in frames[1:])
@@ -119,125 +121,129 @@ def test_starts_with_a_preview_and_converges_to_the_fresh_picture(
     assert_fresh(device, frames[-1], scene, 4)
 
 
-def test_fast_device_shows_no_preview(make_live: MakeLive, device: Device) -> None:
+def test_fast_device_shows_no_preview(make_viewer: MakeViewer, device: Device) -> None:
     scene = mixed_scene()
-    live, _ = make_live(view_of(scene), speed=FAST)
-    run_to(live, view_of(scene), lambda frame: frame.pictures[0].mode is Mode.REFINE)
+    viewer, _ = make_viewer(view_of(scene), speed=FAST)
+    run_to(viewer, view_of(scene), lambda frame: frame.pictures[0].mode is Mode.REFINE)
     for fov_y in range(43, 60):
-        frame = live.advance(view_of(turned(scene, fov_y)))
+        frame = viewer.advance(view_of(turned(scene, fov_y)))
         assert frame is not None and not frame.is_preview
         assert frame.pictures[0].image.shape == (28, 44, 4) and frame.pictures[0].replaced.all()
-    end = frames_until_rest(live, view_of(turned(scene, 59), target_spp=3))[-1]
+    end = frames_until_rest(viewer, view_of(turned(scene, 59), target_spp=3))[-1]
     assert_fresh(device, end, turned(scene, 59), 3)
 
 
-def test_camera_moves_in_previews_and_rests_at_full_resolution(make_live: MakeLive, device: Device) -> None:
+def test_camera_moves_in_previews_and_rests_at_full_resolution(
+    make_viewer: MakeViewer, device: Device
+) -> None:
     scene = mixed_scene()
-    live, clock = make_live(view_of(scene, target_spp=2))
-    frames_until_rest(live, view_of(scene, target_spp=2))
+    viewer, clock = make_viewer(view_of(scene, target_spp=2))
+    frames_until_rest(viewer, view_of(scene, target_spp=2))
     for fov_y in range(43, 50):
         view = view_of(turned(scene, fov_y), target_spp=2)
-        frame = run_to(live, view, lambda f, v=view: f.view == v)
+        frame = run_to(viewer, view, lambda f, v=view: f.view == v)
         assert frame.is_preview and (frame.pictures[0].image[..., 3] == 1).all()
         assert frame.pictures[0].replaced.all()
     changed = clock.now
-    frame = run_to(live, view, lambda frame: not frame.is_preview)
+    frame = run_to(viewer, view, lambda frame: not frame.is_preview)
     assert 0.1 < clock.now - changed < 0.3
     assert frame.pictures[0].image.shape == (28, 44, 4)
     tile_of = frame.pictures[0].grid.tile_of_pixels()
     np.testing.assert_array_equal(frame.pictures[0].image[..., 3] == 1, frame.pictures[0].replaced[tile_of])
-    assert_fresh(device, frames_until_rest(live, view)[-1], view.scene, 2)
+    assert_fresh(device, frames_until_rest(viewer, view)[-1], view.scene, 2)
 
 
-def test_end_of_a_drag_of_the_environment_returns_at_once(make_live: MakeLive) -> None:
+def test_end_of_a_drag_of_the_environment_returns_at_once(make_viewer: MakeViewer) -> None:
     scene = mixed_scene()
-    live, clock = make_live(view_of(scene))
-    run_to(live, view_of(scene), lambda frame: frame.pictures[0].tile_spp.min() > 0 and not frame.is_preview)
+    viewer, clock = make_viewer(view_of(scene))
+    run_to(
+        viewer, view_of(scene), lambda frame: frame.pictures[0].tile_spp.min() > 0 and not frame.is_preview
+    )
     last = scene.with_environment(intensity=0.7)
-    assert run_to(live, view_of(last, before=scene), lambda frame: frame.is_preview)
+    assert run_to(viewer, view_of(last, before=scene), lambda frame: frame.is_preview)
     began = clock.now
-    run_to(live, view_of(last), lambda frame: not frame.is_preview)
+    run_to(viewer, view_of(last), lambda frame: not frame.is_preview)
     assert clock.now - began < 0.05
 
 
-def test_drag_repeats_less_and_ends_with_the_whole_nor(make_live: MakeLive, device: Device) -> None:
+def test_drag_repeats_less_and_ends_with_the_whole_nor(make_viewer: MakeViewer, device: Device) -> None:
     scene = mixed_scene(nor=32)
-    live, _ = make_live(view_of(scene, target_spp=2), speed=FAST)
-    frames_until_rest(live, view_of(scene, target_spp=2))
+    viewer, _ = make_viewer(view_of(scene, target_spp=2), speed=FAST)
+    frames_until_rest(viewer, view_of(scene, target_spp=2))
     for x in (0.2, 0.3, 0.4):
         view = view_of(moved(scene, x), before=scene, drag_nor=4)
-        frame = live.advance(view)
+        frame = viewer.advance(view)
         assert frame is not None and frame.pictures[0].mode in (Mode.INCREMENTAL, Mode.REFINE)
         assert frame.pictures[0].tile_spp[frame.pictures[0].replaced].tolist()
         assert set(frame.pictures[0].tile_spp[frame.pictures[0].replaced]) == {4}
     # Old place and new place: the spiral starts between them.
     end = view_of(moved(scene, 0.4), target_spp=33)
-    frame = live.advance(end)
+    frame = viewer.advance(end)
     assert frame is not None
     assert set(frame.pictures[0].tile_spp[frame.pictures[0].replaced]) == {32}
-    assert_fresh(device, frames_until_rest(live, end)[-1], end.scene, 33)
+    assert_fresh(device, frames_until_rest(viewer, end)[-1], end.scene, 33)
 
 
-def test_drag_is_measured_from_where_it_began(make_live: MakeLive) -> None:
+def test_drag_is_measured_from_where_it_began(make_viewer: MakeViewer) -> None:
     scene = mixed_scene(nor=32)
-    live, _ = make_live(view_of(scene, target_spp=2), speed=1.2e5)
-    frames_until_rest(live, view_of(scene, target_spp=2))
+    viewer, _ = make_viewer(view_of(scene, target_spp=2), speed=1.2e5)
+    frames_until_rest(viewer, view_of(scene, target_spp=2))
     for x in (-0.5, -1.0, -1.5):
-        live.advance(view_of(moved(scene, x), before=scene, drag_nor=4))
-    alone = Session(scene, device=live.device)
+        viewer.advance(view_of(moved(scene, x), before=scene, drag_nor=4))
+    alone = Session(scene, device=viewer.device)
     alone.render(1)
     alone.edit(moved(scene, -1.5))
-    queue = live.session.queue.tiles
+    queue = viewer.session.queue.tiles
     np.testing.assert_array_equal(queue, alone.queue.tiles)
 
 
-def test_every_edit_of_a_fast_drag_is_answered_by_a_tile(make_live: MakeLive) -> None:
+def test_every_edit_of_a_fast_drag_is_answered_by_a_tile(make_viewer: MakeViewer) -> None:
     scene = mixed_scene()
-    live, clock = make_live(view_of(scene, target_spp=1), speed=1.2e5)
-    frames_until_rest(live, view_of(scene, target_spp=1))
+    viewer, clock = make_viewer(view_of(scene, target_spp=1), speed=1.2e5)
+    frames_until_rest(viewer, view_of(scene, target_spp=1))
     clock.edits, clock.speed = 0, 1.2e4  # so that a tile of the drag, 4 x 64 paths, takes two steps
     steps, answers = 60, 0
     for i in range(steps):
-        frame = live.advance(view_of(moved(scene, 0.2 + 0.01 * i), before=scene, drag_nor=4))
+        frame = viewer.advance(view_of(moved(scene, 0.2 + 0.01 * i), before=scene, drag_nor=4))
         assert frame is not None
         answers += bool(frame.pictures[0].replaced.any())
     # Each edit but the last was followed by a finished tile before the next one was taken up.
     assert steps / 4 < clock.edits <= answers + 1 < steps
 
 
-def test_edits_between_two_steps_become_one(make_live: MakeLive) -> None:
+def test_edits_between_two_steps_become_one(make_viewer: MakeViewer) -> None:
     scene = mixed_scene()
-    live, clock = make_live(view_of(scene), speed=FAST)
-    run_to(live, view_of(scene), lambda frame: frame.pictures[0].mode is Mode.REFINE)
+    viewer, clock = make_viewer(view_of(scene), speed=FAST)
+    run_to(viewer, view_of(scene), lambda frame: frame.pictures[0].mode is Mode.REFINE)
     clock.edits = 0
-    live.advance(view_of(moved(scene, 0.7)))
-    live.advance(view_of(moved(scene, 0.7)))
+    viewer.advance(view_of(moved(scene, 0.7)))
+    viewer.advance(view_of(moved(scene, 0.7)))
     assert clock.edits == 1
-    assert live.session.scene == moved(scene, 0.7)
+    assert viewer.session.scene == moved(scene, 0.7)
 
 
 @pytest.mark.parametrize("step_ms", [5.0, 20.0])
-def test_steps_take_the_time_they_are_given(make_live: MakeLive, step_ms: float) -> None:
+def test_steps_take_the_time_they_are_given(make_viewer: MakeViewer, step_ms: float) -> None:
     scene = mixed_scene(size=(176, 112))
-    live, clock = make_live(view_of(scene, step_ms=step_ms), speed=3e5)
+    viewer, clock = make_viewer(view_of(scene, step_ms=step_ms), speed=3e5)
     view = view_of(scene, step_ms=step_ms)
-    run_to(live, view, lambda frame: frame.pictures[0].tile_spp.min() >= 1 and not frame.is_preview)
-    seconds = np.array([live.advance(view).step_seconds for _ in range(100)])  # type: ignore[union-attr]
+    run_to(viewer, view, lambda frame: frame.pictures[0].tile_spp.min() >= 1 and not frame.is_preview)
+    seconds = np.array([viewer.advance(view).step_seconds for _ in range(100)])  # type: ignore[union-attr]
     assert np.median(seconds) == pytest.approx(step_ms / 1e3, rel=0.15)
     assert seconds.max() < 1.5 * step_ms / 1e3
     # A stall of the machine neither stops the rendering nor leads to long steps after it.
     clock.stall = 1.0
-    assert live.advance(view).step_seconds > 1  # type: ignore[union-attr]
-    after = [live.advance(view).step_seconds for _ in range(100)]  # type: ignore[union-attr]
+    assert viewer.advance(view).step_seconds > 1  # type: ignore[union-attr]
+    after = [viewer.advance(view).step_seconds for _ in range(100)]  # type: ignore[union-attr]
     assert max(after) < 1.5 * step_ms / 1e3 and np.median(after) > 0.8 * step_ms / 1e3
 
 
 def test_refused_edit_is_told_once_and_the_old_picture_goes_on(
-    make_live: MakeLive, device: Device, monkeypatch: pytest.MonkeyPatch
+    make_viewer: MakeViewer, device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = mixed_scene()
-    live, _ = make_live(view_of(scene, target_spp=2))
-    frames_until_rest(live, view_of(scene, target_spp=2))
+    viewer, _ = make_viewer(view_of(scene, target_spp=2))
+    frames_until_rest(viewer, view_of(scene, target_spp=2))
     bad = view_of(moved(scene), target_spp=4)
 
     def fail(*_: object) -> None:
@@ -246,31 +252,33 @@ def test_refused_edit_is_told_once_and_the_old_picture_goes_on(
     with monkeypatch.context() as patch:
         patch.setattr("incpt.accel.top_level.build_top", fail)
         with pytest.raises(MemoryError):
-            live.advance(bad)
-        end = frames_until_rest(live, bad)[-1]
+            viewer.advance(bad)
+        end = frames_until_rest(viewer, bad)[-1]
     assert end.view.scene == scene
     assert_fresh(device, end, scene, 4)
-    assert_fresh(device, frames_until_rest(live, view_of(moved(scene), target_spp=17))[-1], moved(scene), 17)
+    assert_fresh(
+        device, frames_until_rest(viewer, view_of(moved(scene), target_spp=17))[-1], moved(scene), 17
+    )
 
 
-def test_refused_setting_is_told_once(make_live: MakeLive, device: Device) -> None:
+def test_refused_setting_is_told_once(make_viewer: MakeViewer, device: Device) -> None:
     scene = mixed_scene()
-    live, _ = make_live(view_of(scene))
-    run_to(live, view_of(scene), lambda frame: frame.pictures[0].mode is Mode.REFINE)
+    viewer, _ = make_viewer(view_of(scene))
+    run_to(viewer, view_of(scene), lambda frame: frame.pictures[0].mode is Mode.REFINE)
     for camera in (scene, turned(scene, 50)):
         bad = view_of(replace(camera, settings=replace(scene.settings, sample_rate=4096, tile_size=1024)))
         with pytest.raises(InputError, match="sample_rate"):
-            live.advance(bad)
-        frame = live.advance(bad)
+            viewer.advance(bad)
+        frame = viewer.advance(bad)
         assert frame is not None and frame.view.scene == scene
 
 
 def test_size_that_memory_does_not_hold_is_told_after_the_preview(
-    make_live: MakeLive, device: Device, monkeypatch: pytest.MonkeyPatch
+    make_viewer: MakeViewer, device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = mixed_scene()
-    live, _ = make_live(view_of(scene, target_spp=2))
-    frames_until_rest(live, view_of(scene, target_spp=2))
+    viewer, _ = make_viewer(view_of(scene, target_spp=2))
+    frames_until_rest(viewer, view_of(scene, target_spp=2))
     empty = device.empty
 
     def small(nbytes: int) -> object:
@@ -280,149 +288,148 @@ def test_size_that_memory_does_not_hold_is_told_after_the_preview(
 
     monkeypatch.setattr(device, "empty", small)
     large = replace(scene, settings=replace(scene.settings, size=(400, 400)))
-    run_to(live, view_of(large), lambda frame: frame.is_preview)
+    run_to(viewer, view_of(large), lambda frame: frame.is_preview)
     with pytest.raises(DeviceError, match="no memory"):
-        run_to(live, view_of(large), lambda frame: not frame.is_preview)
-    end = run_to(live, view_of(large), lambda f: not f.is_preview and f.pictures[0].tile_spp.min() == 2)
+        run_to(viewer, view_of(large), lambda frame: not frame.is_preview)
+    end = run_to(viewer, view_of(large), lambda f: not f.is_preview and f.pictures[0].tile_spp.min() == 2)
     assert end.view.scene == scene
 
 
-def test_paused_view_takes_edits_and_renders_nothing(make_live: MakeLive, device: Device) -> None:
+def test_paused_view_takes_edits_and_renders_nothing(make_viewer: MakeViewer, device: Device) -> None:
     scene = mixed_scene()
-    live, clock = make_live(view_of(scene, target_spp=2), speed=FAST)
-    frames_until_rest(live, view_of(scene, target_spp=2))
+    viewer, clock = make_viewer(view_of(scene, target_spp=2), speed=FAST)
+    frames_until_rest(viewer, view_of(scene, target_spp=2))
     began = clock.now
     for camera in (scene, turned(scene, 60)):
         view = view_of(camera, paused=True)
-        frame = live.advance(view)
+        frame = viewer.advance(view)
         assert frame is not None and frame.resting and frame.view == view
-        assert live.advance(view) is None
-    assert clock.now == began and live.session.scene == turned(scene, 60)
-    end = frames_until_rest(live, view_of(turned(scene, 60), target_spp=2))[-1]
+        assert viewer.advance(view) is None
+    assert clock.now == began and viewer.session.scene == turned(scene, 60)
+    end = frames_until_rest(viewer, view_of(turned(scene, 60), target_spp=2))[-1]
     assert_fresh(device, end, turned(scene, 60), 2)
 
 
-def test_split_gives_both_sides_equal_time(make_live: MakeLive) -> None:
+def test_split_gives_both_sides_equal_time(make_viewer: MakeViewer) -> None:
     scene = mixed_scene(size=(88, 56))
-    live, _ = make_live(view_of(scene, split=True), speed=2e5)
+    viewer, _ = make_viewer(view_of(scene, split=True), speed=2e5)
     view = view_of(scene, split=True)
-    run_to(live, view, lambda frame: all(p.tile_spp.min() >= 2 for p in frame.pictures))
+    run_to(viewer, view, lambda frame: all(p.tile_spp.min() >= 2 for p in frame.pictures))
     edited = view_of(moved(scene), split=True)
     for _ in range(30):
-        frame = live.advance(edited)
+        frame = viewer.advance(edited)
         assert frame is not None and not frame.is_preview
     restart, spiral = frame.pictures
     assert (restart.strategy, spiral.strategy) == ("restart", "spiral")
     assert abs(restart.seconds - spiral.seconds) <= 0.035 and spiral.seconds > 0.1
     assert spiral.mode is Mode.INCREMENTAL and restart.tile_spp.min() >= 1
     assert set(spiral.tile_spp[spiral.replaced]) == {16}
-    assert len(live.advance(view_of(moved(scene))).pictures) == 1  # type: ignore[union-attr]
+    assert len(viewer.advance(view_of(moved(scene))).pictures) == 1  # type: ignore[union-attr]
 
 
-def test_error_against_a_pinned_reference(make_live: MakeLive) -> None:
+def test_error_against_a_pinned_reference(make_viewer: MakeViewer) -> None:
     scene = mixed_scene()
-    live, _ = make_live(view_of(scene, target_spp=4), speed=FAST)
-    frames_until_rest(live, view_of(scene, target_spp=4))
-    live.pin_reference(True)
-    frame = live.advance(view_of(scene, target_spp=4))
+    viewer, _ = make_viewer(view_of(scene, target_spp=4), speed=FAST)
+    frames_until_rest(viewer, view_of(scene, target_spp=4))
+    viewer.pin_reference(True)
+    frame = viewer.advance(view_of(scene, target_spp=4))
     assert frame is not None and frame.pictures[0].error == 0 and frame.is_pinned
-    pinned = frames_until_rest(live, view_of(turned(scene, 61), target_spp=4))[-1].pictures[0].error
+    pinned = frames_until_rest(viewer, view_of(turned(scene, 61), target_spp=4))[-1].pictures[0].error
     assert pinned is not None and 0.01 < pinned < 1
     smaller = view_of(turned(scene, 61), target_spp=4, resolution_scale=0.5)
-    last = frames_until_rest(live, smaller)[-1]
+    last = frames_until_rest(viewer, smaller)[-1]
     assert last.pictures[0].error is None and not last.is_pinned
-    back = frames_until_rest(live, view_of(turned(scene, 61), target_spp=4))[-1]
+    back = frames_until_rest(viewer, view_of(turned(scene, 61), target_spp=4))[-1]
     assert back.pictures[0].error is None
 
 
 def test_first_hits_come_when_wanted_and_small_while_moving(
-    make_live: MakeLive, monkeypatch: pytest.MonkeyPatch
+    make_viewer: MakeViewer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = mixed_scene()
-    live, _ = make_live(view_of(scene, target_spp=1))
-    assert all(frame.aovs is None for frame in frames_until_rest(live, view_of(scene, target_spp=1)))
+    viewer, _ = make_viewer(view_of(scene, target_spp=1))
+    assert all(frame.aovs is None for frame in frames_until_rest(viewer, view_of(scene, target_spp=1)))
     still = view_of(scene, target_spp=1, aovs=True)
-    frame = frames_until_rest(live, still)[-1]
+    frame = frames_until_rest(viewer, still)[-1]
     assert frame.aovs is not None and frame.aovs.depth.shape == (28, 44)
-    np.testing.assert_array_equal(frame.aovs.object_id, live.session.aovs().object_id)
+    np.testing.assert_array_equal(frame.aovs.object_id, viewer.session.aovs().object_id)
     # Only rendering moves this clock: say that the rays of first hits are slow too.
-    for _ in range(3):
-        live._aov_pace.add(60_000, 1.0)
-    monkeypatch.setattr(live._aov_pace, "add", lambda *_: None)
+    viewer._first_hits.pace = Pace(60_000.0)
+    monkeypatch.setattr(viewer._first_hits, "_learn", lambda *_: None)
     view = view_of(moved(scene), before=scene, aovs=True)
-    moving = run_to(live, view, lambda frame: frame.view == view and bool(frame.pictures[0].replaced.any()))
+    moving = run_to(viewer, view, lambda frame: frame.view == view and bool(frame.pictures[0].replaced.any()))
     assert moving.aovs is not None and moving.aovs.depth.shape[0] < 28
     assert moving.aovs is not frame.aovs
     end = view_of(moved(scene), aovs=True, target_spp=17)
-    last = frames_until_rest(live, end)[-1].aovs
+    last = frames_until_rest(viewer, end)[-1].aovs
     assert last is not None and last.depth.shape == (28, 44)
-    np.testing.assert_array_equal(last.object_id, live.session.aovs().object_id)
+    np.testing.assert_array_equal(last.object_id, viewer.session.aovs().object_id)
 
 
-def test_picks_by_point(make_live: MakeLive) -> None:
-    live, _ = make_live(view_of(mixed_scene()))
-    assert live.pick((0.5, 0.5)) == "red cube"
-    assert live.pick((0.02, 0.95)) == "floor"
-    assert live.pick((0.0, 0.0)) is None and live.pick((1.5, 0.5)) is None
+def test_picks_by_point(make_viewer: MakeViewer) -> None:
+    viewer, _ = make_viewer(view_of(mixed_scene()))
+    assert viewer.pick((0.5, 0.5)) == "red cube"
+    assert viewer.pick((0.02, 0.95)) == "floor"
+    assert viewer.pick((0.0, 0.0)) is None and viewer.pick((1.5, 0.5)) is None
 
 
-def test_export_writes_the_whole_picture_of_full_size(make_live: MakeLive, tmp_path: Path) -> None:
+def test_export_writes_the_whole_picture_of_full_size(make_viewer: MakeViewer, tmp_path: Path) -> None:
     scene = mixed_scene()
-    live, _ = make_live(view_of(scene))
-    run_to(live, view_of(scene), lambda frame: frame.pictures[0].mode is Mode.REFINE)
-    run_to(live, view_of(turned(scene, 50)), lambda frame: frame.is_preview)
-    live.export(tmp_path / "a.exr", aovs=True)
+    viewer, _ = make_viewer(view_of(scene))
+    run_to(viewer, view_of(scene), lambda frame: frame.pictures[0].mode is Mode.REFINE)
+    run_to(viewer, view_of(turned(scene, 50)), lambda frame: frame.is_preview)
+    viewer.export(tmp_path / "a.exr", aovs=True)
     layers = OpenEXR.File(str(tmp_path / "a.exr")).channels()
     assert layers["RGB"].pixels.shape == (28, 44, 3) and layers["RGB"].pixels.min(axis=2).max() > 0
     assert {"albedo", "normal.X", "depth.Z", "object_id"} <= set(layers)
-    live.export(tmp_path / "a.png")
-    live.export(tmp_path / "b.png", exposure=2.0, curve="srgb")
+    viewer.export(tmp_path / "a.png")
+    viewer.export(tmp_path / "b.png", exposure=2.0, curve="srgb")
     a, b = (np.asarray(PIL.Image.open(tmp_path / f"{name}.png")) for name in "ab")
     assert a.shape == (28, 44, 3) and b.mean() > a.mean() + 20
     with pytest.raises(InputError, match="known format"):
-        live.export(tmp_path / "a.jpg")
+        viewer.export(tmp_path / "a.jpg")
 
 
-def test_restart_throws_away_what_was_accumulated(make_live: MakeLive) -> None:
+def test_restart_throws_away_what_was_accumulated(make_viewer: MakeViewer) -> None:
     scene = mixed_scene()
-    live, _ = make_live(view_of(scene, target_spp=3), speed=FAST)
-    frames_until_rest(live, view_of(scene, target_spp=3))
-    live.restart()
-    frame = live.advance(view_of(scene, target_spp=3))
+    viewer, _ = make_viewer(view_of(scene, target_spp=3), speed=FAST)
+    frames_until_rest(viewer, view_of(scene, target_spp=3))
+    viewer.restart()
+    frame = viewer.advance(view_of(scene, target_spp=3))
     assert frame is not None and frame.pictures[0].tile_spp.max() == 1
 
 
-def test_settings_reset_only_what_they_must(make_live: MakeLive, device: Device) -> None:
+def test_settings_reset_only_what_they_must(make_viewer: MakeViewer, device: Device) -> None:
     scene = mixed_scene()
-    live, _ = make_live(view_of(scene, target_spp=3), speed=FAST)
-    frames_until_rest(live, view_of(scene, target_spp=3))
+    viewer, _ = make_viewer(view_of(scene, target_spp=3), speed=FAST)
+    frames_until_rest(viewer, view_of(scene, target_spp=3))
 
     def with_settings(**changes: object) -> Scene:
         return replace(scene, settings=replace(scene.settings, **changes))  # type: ignore[arg-type]
 
-    kept = frames_until_rest(live, view_of(with_settings(nor=7, base_nor=2), target_spp=3))
+    kept = frames_until_rest(viewer, view_of(with_settings(nor=7, base_nor=2), target_spp=3))
     assert len(kept) == 1 and (kept[0].pictures[0].tile_spp == 3).all()
     other = with_settings(max_bounces=0)
-    frames = frames_until_rest(live, view_of(other, target_spp=3))
+    frames = frames_until_rest(viewer, view_of(other, target_spp=3))
     assert frames[0].pictures[0].tile_spp.max() == 1
     assert_fresh(device, frames[-1], other, 3)
-    small = frames_until_rest(live, view_of(other, target_spp=2, resolution_scale=0.4))[-1]
+    small = frames_until_rest(viewer, view_of(other, target_spp=2, resolution_scale=0.4))[-1]
     assert small.pictures[0].image.shape == (11, 18, 4)
 
 
-def test_unchanged_picture_is_not_read_again(make_live: MakeLive) -> None:
+def test_unchanged_picture_is_not_read_again(make_viewer: MakeViewer) -> None:
     scene = mixed_scene(size=(176, 112))
-    live, clock = make_live(view_of(scene), speed=1e6)
+    viewer, clock = make_viewer(view_of(scene), speed=1e6)
     view = view_of(scene, step_ms=2.0)
-    run_to(live, view, lambda frame: frame.pictures[0].tile_spp.min() >= 2)
+    run_to(viewer, view, lambda frame: frame.pictures[0].tile_spp.min() >= 2)
     began = clock.now
-    images = {id(image): image for image in (live.advance(view).pictures[0].image for _ in range(200))}  # type: ignore[union-attr]
+    images = {id(image): image for image in (viewer.advance(view).pictures[0].image for _ in range(200))}  # type: ignore[union-attr]
     assert len(images) <= (clock.now - began) / 0.1 + 2
 
 
 def test_reports_the_building_of_kernels(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(device, "built", set())
     seen: list[tuple[int, int]] = []
-    Live(view_of(mixed_scene()), device, lambda done, total: seen.append((done, total)))
+    Viewer(view_of(mixed_scene()), device, lambda done, total: seen.append((done, total)))
     total = seen[0][1]
     assert seen == [(done, total) for done in range(1, total + 1)] and total >= 10

@@ -10,7 +10,7 @@ from incpt.ui.commands.files import ask_path, stem
 from incpt.ui.dialogs.native import FileKind
 from incpt.ui.editor import clipboard
 from incpt.ui.editor.editor import Editor
-from incpt.viewer.threaded import Export
+from incpt.viewer.renderer import Export
 
 PICTURES = FileKind("Pictures", (".png", ".exr"))
 """Files that the picture can be written to."""

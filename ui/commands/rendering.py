@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from incpt.ui.editor.editor import Editor
-from incpt.viewer.threaded import Pin
+from incpt.viewer.renderer import Pin
 
 
 def match_window(editor: Editor) -> None:

@@ -16,7 +16,7 @@ from incpt.ui.display.projection import split_x, viewport_of, whole_pixels
 from incpt.ui.display.textures import PictureTextures
 from incpt.ui.preferences import DisplaySettings
 from incpt.ui.rect import Rect
-from incpt.viewer.viewer import Picture
+from incpt.viewer.view import Picture
 
 NEAREST_FROM = 2.0
 """Magnification from which pixels are shown as squares."""

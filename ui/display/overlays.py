@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.render.first_hits import Aovs
-from incpt.viewer.viewer import Picture
+from incpt.viewer.view import Picture
 
 Pixels = npt.NDArray[np.uint8]
 """(h, w, 3) or (h, w, 4), sRGB, row 0 on top."""

@@ -12,7 +12,7 @@ from incpt.render.first_hits import Aovs
 from incpt.render.tiles import TileGrid
 from incpt.ui.display import overlays
 from incpt.ui.display.overlays import Overlay
-from incpt.viewer.viewer import Picture
+from incpt.viewer.view import Picture
 
 
 class PictureTextures:

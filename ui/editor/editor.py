@@ -22,8 +22,8 @@ from incpt.ui.editor.document import Document
 from incpt.ui.editor.notices import Notices
 from incpt.ui.editor.state import Control, Gesture, Rendering, Screen, Tool
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
-from incpt.viewer.threaded import Exported, Message, Pick, Picked, Problem, Renderer, Restart
-from incpt.viewer.viewer import Frame, View
+from incpt.viewer.renderer import Exported, Message, Pick, Picked, Problem, Renderer, Restart
+from incpt.viewer.view import Frame, View
 
 OpenRenderer = Callable[[str | None], Renderer]
 """Opens a renderer on a device, given by name or None for the default."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from incpt.viewer.viewer import Frame
+from incpt.viewer.view import Frame
 
 _MOST_POINTS = 600
 """How many values of a quantity are kept."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from incpt.viewer.threaded import Building, Message, Problem
-from incpt.viewer.viewer import Frame
+from incpt.viewer.renderer import Building, Message, Problem
+from incpt.viewer.view import Frame
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from incpt.ui.editor.notices import Notice
 from incpt.ui.panels.render import MODE_TEXTS
 from incpt.ui.rect import Rect
 from incpt.ui.widgets import places, theme
-from incpt.viewer.viewer import Frame
+from incpt.viewer.view import Frame
 
 _COLORS = {"done": theme.QUIET, "warning": theme.WARNING, "error": theme.ERROR}
 """Colours of notices, by level."""

@@ -13,7 +13,7 @@ from incpt.ui.editor.state import Control
 from incpt.ui.preferences import Preferences
 from incpt.ui.widgets import places, widgets
 from incpt.ui.widgets.refusals import Refusals
-from incpt.viewer.viewer import Frame, Picture
+from incpt.viewer.view import Frame, Picture
 
 MODE_TEXTS = {
     Mode.BASE: "Base: the first picture",

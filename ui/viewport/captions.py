@@ -9,7 +9,7 @@ from incpt.ui.display.projection import split_x
 from incpt.ui.preferences import DisplaySettings
 from incpt.ui.rect import Point, Rect
 from incpt.ui.widgets import theme
-from incpt.viewer.viewer import Frame, Picture
+from incpt.viewer.view import Frame, Picture
 
 _NUMBERS_MARGIN = 4.0
 """How much wider than its number a tile has to be on the screen for numbers to be written, in points."""

@@ -19,7 +19,7 @@ from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
 from incpt.ui.rect import Point, Rect
 from incpt.ui.viewport.gizmo import Gizmo
 from incpt.ui.widgets import places
-from incpt.viewer.threaded import Pick
+from incpt.viewer.renderer import Pick
 
 ZOOM_REST_SECONDS = 0.4
 """Turns of the wheel that are closer together than this are one entry of the history."""

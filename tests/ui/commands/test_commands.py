@@ -26,7 +26,7 @@ from incpt.ui.editor import clipboard
 from incpt.ui.editor.document import Document, new_scene
 from incpt.ui.panels.display import OVERLAY_TEXTS
 from incpt.ui.preferences import NAVIGATIONS, OVERLAYS
-from incpt.viewer.threaded import Restart
+from incpt.viewer.renderer import Restart
 
 MIXED = mixed_scene(size=(48, 32))
 SCENES = {"mixed": MIXED, "example": Document.example().scene, "empty": Scene()}

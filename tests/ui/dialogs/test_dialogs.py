@@ -23,7 +23,7 @@ from incpt.ui.dialogs.question import Question
 from incpt.ui.editor import clipboard
 from incpt.ui.editor.document import new_scene
 from incpt.ui.editor.recovery import Recovery
-from incpt.viewer.threaded import Export
+from incpt.viewer.renderer import Export
 
 SCENE = mixed_scene(size=(48, 32)).with_environment(image=None)
 OTHER = SCENE.with_camera(fov_y=33)

@@ -21,7 +21,7 @@ from incpt.render.modes import Mode
 from incpt.scene.model import Scene
 from incpt.ui.display import overlays
 from incpt.ui.preferences import DisplaySettings
-from incpt.viewer.viewer import Picture
+from incpt.viewer.view import Picture
 
 if os.environ.get("CI"):
     import moderngl

@@ -12,7 +12,7 @@ from incpt.render.first_hits import Aovs
 from incpt.render.modes import Mode
 from incpt.ui.display import overlays
 from incpt.ui.preferences import OVERLAYS
-from incpt.viewer.viewer import Picture
+from incpt.viewer.view import Picture
 
 WIDTH, HEIGHT, TILE = 44, 28, 8
 GRID = tiles.TileGrid(WIDTH, HEIGHT, TILE)

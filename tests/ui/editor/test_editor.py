@@ -21,7 +21,7 @@ from incpt.scene.selection import Selection
 from incpt.ui.commands import command, materials, objects, pictures, table
 from incpt.ui.panels.notices import status_text
 from incpt.ui.preferences import DisplaySettings, Preferences
-from incpt.viewer.threaded import Building, Export, Exported, Pin, Problem
+from incpt.viewer.renderer import Building, Export, Exported, Pin, Problem
 
 SCENE = mixed_scene(size=(48, 32))
 

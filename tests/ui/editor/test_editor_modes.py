@@ -1,4 +1,4 @@
-"""The mode that follows each thing a user does, with a real Live behind the editor."""
+"""The mode that follows each thing a user does, with a real Viewer behind the editor."""
 
 from __future__ import annotations
 
@@ -19,35 +19,36 @@ from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
 from incpt.ui.commands import files, objects
 from incpt.ui.preferences import DisplaySettings, Preferences
-from incpt.viewer.threaded import Message, Pick, Picked, Request, Restart
-from incpt.viewer.viewer import Frame, Live, View
+from incpt.viewer.renderer import Message, Pick, Picked, Request, Restart
+from incpt.viewer.view import Frame, View
+from incpt.viewer.viewer import Viewer
 
 BASE, REFINE, INCREMENTAL = Mode.BASE, Mode.REFINE, Mode.INCREMENTAL
 SCENE = mixed_scene(size=(48, 32), nor=8)
 STEP_SECONDS = 0.01
 
 
-class LiveRenderer:
-    """A Live without a thread: `advance` is called by the test, which sees every frame."""
+class SteppedRenderer:
+    """A Viewer without a thread: `advance` is called by the test, which sees every frame."""
 
     def __init__(self, device: Device, clock: Callable[[], float]) -> None:
         self._device, self._clock = device, clock
-        self.live: Live | None = None
+        self.viewer: Viewer | None = None
         self.view: View | None = None
         self.frame: Frame | None = None
         self._messages: list[Message] = []
 
     def show(self, view: View) -> None:
         self.view = view
-        if self.live is None:
-            self.live = Live(view, self._device, clock=self._clock)
+        if self.viewer is None:
+            self.viewer = Viewer(view, self._device, clock=self._clock)
 
     def request(self, request: Request) -> None:
-        assert self.live is not None
+        assert self.viewer is not None
         if isinstance(request, Pick):
-            self._messages.append(Picked(request.point, self.live.pick(request.point), request.additive))
+            self._messages.append(Picked(request.point, self.viewer.pick(request.point), request.additive))
         elif isinstance(request, Restart):
-            self.live.restart()
+            self.viewer.restart()
 
     def poll(self) -> list[Message]:
         messages, self._messages = self._messages, []
@@ -58,12 +59,12 @@ class LiveRenderer:
 
     @property
     def session(self) -> Session:
-        assert self.live is not None
-        return self.live.session
+        assert self.viewer is not None
+        return self.viewer.session
 
     def advance(self) -> Frame | None:
-        assert self.live is not None and self.view is not None
-        frame = self.live.advance(self.view)
+        assert self.viewer is not None and self.view is not None
+        frame = self.viewer.advance(self.view)
         if frame is not None:
             self.frame = frame
             self._messages.append(frame)
@@ -71,8 +72,8 @@ class LiveRenderer:
 
     def take_up(self) -> None:
         """Follow the view without a step: a step may end the queue of so small a picture."""
-        assert self.live is not None and self.view is not None
-        self.live._follow(self.view)
+        assert self.viewer is not None and self.view is not None
+        self.viewer._follow(self.view)
 
     def until(self, condition: Callable[[Frame], bool]) -> Frame:
         for _ in range(400):
@@ -87,7 +88,7 @@ class Table:
     """A user before an editor, and the renderer behind it."""
 
     user: Desk
-    renderer: LiveRenderer
+    renderer: SteppedRenderer
 
     def settle(self) -> None:
         """Until the picture is refined at full resolution, and nothing has been edited for a while."""
@@ -110,7 +111,7 @@ def table(device: Device, monkeypatch: pytest.MonkeyPatch) -> Iterator[Table]:
         return step(session, slots)
 
     monkeypatch.setattr(Session, "step", timed_step)
-    renderer = LiveRenderer(device, lambda: seconds[0])
+    renderer = SteppedRenderer(device, lambda: seconds[0])
     with desk(SCENE, Preferences(step_ms=20.0), renderer) as user:
         user.editor.select(Selection(("red cube",)))
         made = Table(user, renderer)

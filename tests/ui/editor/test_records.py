@@ -8,7 +8,7 @@ from support.small_scenes import mixed_scene
 from support.ui_harness import frame_of
 
 from incpt.ui.editor.records import Records
-from incpt.viewer.viewer import Frame, View
+from incpt.viewer.view import Frame, View
 
 SCENE = mixed_scene(size=(48, 32))
 VIEW = View(SCENE)

@@ -12,7 +12,7 @@ from support.ui_harness import Desk, changes, desk, places, state
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
-from incpt.viewer.threaded import Pin, Restart
+from incpt.viewer.renderer import Pin, Restart
 
 SCENE = mixed_scene(size=(48, 32))
 PREFERENCES = Preferences(

@@ -13,7 +13,7 @@ from support.ui_harness import Desk, changes, desk, flat, state, tell
 from incpt.scene.selection import Selection
 from incpt.ui.preferences import SnapSettings
 from incpt.ui.viewport.viewport import Outcome
-from incpt.viewer.threaded import Pick, Picked
+from incpt.viewer.renderer import Pick, Picked
 
 SCENE = mixed_scene(size=(48, 32))
 

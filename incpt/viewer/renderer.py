@@ -1,0 +1,101 @@
+"""What passes between an editor and its renderer: requests go in, messages come out.
+
+`Renderer` is all that an editor needs; `threaded.ThreadedRenderer` is one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from incpt.viewer.view import Frame, View
+
+
+@dataclass(frozen=True)
+class Pick:
+    """Which object is at `point`, in units of the image from the top left? `additive` comes back as it is."""
+
+    point: tuple[float, float]
+    additive: bool = False
+
+
+@dataclass(frozen=True)
+class Export:
+    """Write the picture: .exr is linear radiance, `aovs` adds first-hit layers; .png is tone-mapped as
+    `exposure` and `curve` say."""
+
+    path: Path
+    aovs: bool = False
+    exposure: float = 0.0
+    curve: str = "agx"
+
+
+@dataclass(frozen=True)
+class Pin:
+    """Compare with the picture as it is now, or no longer."""
+
+    on: bool
+
+
+@dataclass(frozen=True)
+class Restart:
+    """Throw away what was accumulated."""
+
+
+Request = Pick | Export | Pin | Restart
+
+
+@dataclass(frozen=True)
+class Building:
+    """`done` of `total` steps of building the kernels are done."""
+
+    done: int
+    total: int
+
+
+@dataclass(frozen=True)
+class Picked:
+    """The answer to a Pick: the object's name, or None."""
+
+    point: tuple[float, float]
+    name: str | None
+    additive: bool
+
+
+@dataclass(frozen=True)
+class Exported:
+    """The picture is in the file."""
+
+    path: Path
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One line that names the place and the fix. After a fatal one the renderer does nothing more."""
+
+    text: str
+    fatal: bool = False
+
+
+Message = Frame | Building | Picked | Exported | Problem
+
+
+class Renderer(Protocol):
+    """What the editor needs of a renderer. No call blocks but `close`."""
+
+    def show(self, view: View) -> None:
+        """Render this from now on; of several calls the last one counts."""
+        ...
+
+    def request(self, request: Request) -> None:
+        """Do this between two steps, in the order of the calls."""
+        ...
+
+    def poll(self) -> list[Message]:
+        """What came since the last call; of Frames, and of Buildings, the latest only."""
+        ...
+
+    def close(self) -> None:
+        """Stop after the step under way and free the device."""
+        ...
