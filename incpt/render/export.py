@@ -16,7 +16,7 @@ def write_picture(
     path: Path, session: Session, with_aovs: bool = False, exposure: float = 0.0, curve: str = "agx"
 ) -> None:
     """Write the picture as it is now: .exr holds linear radiance and, `with_aovs`, the first-hit images as
-    layers; .png is tone-mapped (see `image_io.tone_map`). Raises InputError for another suffix, OutputError
+    layers; .png is tone-mapped (see `tone_mapping.tone_map`). Raises InputError for another suffix, OutputError
     where the file cannot be written."""
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:

@@ -295,6 +295,17 @@ def test_step_takes_as_many_slots_as_it_is_given(device: Device, converged: np.n
     assert_same(session.image(), converged)
 
 
+def test_memory_of_long_steps_goes_back_with_settings_that_need_less(device: Device) -> None:
+    session = Session(mixed_scene(slots_per_step=4), device=device)
+    strides = [session._state.path_buffer.stride]
+    for change in ({}, {"nor": 3}, {"slots_per_step": 8}, {"slots_per_step": 2}):
+        session.step(20)
+        session.configure(replace(session.settings, **change))
+        strides.append(session._state.path_buffer.stride)
+    first, grown, kept, more, less = strides
+    assert first < grown == kept == more and less < first
+
+
 def test_step_makes_do_with_the_memory_there_is(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     session = Session(mixed_scene(slots_per_step=4), device=device)
 

@@ -154,6 +154,11 @@ def test_a_drag_repeats_less_and_its_end_starts_anew() -> None:
     assert slow.nor == 9
     end = scheduler.next_work(situation(view_of(moved(scene)), side_of(dragged)))
     assert isinstance(end, Follow) and end.settings.nor == 32 and end.ends_drag and end.since is scene
+    # Repetitions that grow within a drag, because rendering became faster, do not end it.
+    faster = replace(side_of(replace(dragged, drag_nor=30), SLOW), whole=FAST)
+    more = scheduler.next_work(situation(view_of(moved(scene, 0.3), before=scene, drag_nor=30), faster))
+    assert isinstance(more, Follow) and more.settings.nor == 30 > faster.progress.settings.nor
+    assert not more.ends_drag and more.since is scene
     # Where tiles had all repetitions already, nothing is to be made up for.
     whole = side_of(replace(dragged, drag_nor=32), Pace(1e9))
     end = scheduler.next_work(situation(view_of(moved(scene)), whole))
