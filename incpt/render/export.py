@@ -16,8 +16,8 @@ def write_picture(
     path: Path, session: Session, with_aovs: bool = False, exposure: float = 0.0, curve: str = "agx"
 ) -> None:
     """Write the picture as it is now: .exr holds linear radiance and, `with_aovs`, the first-hit images as
-    layers; .png is tone-mapped (see `tone_mapping.tone_map`). Raises InputError for another suffix, OutputError
-    where the file cannot be written."""
+    layers; .png is tone-mapped (see `tone_mapping.tone_map`). Raises InputError for another suffix, and
+    OutputError where the file cannot be written."""
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise InputError(f"{path}: ends in no known format; use .exr or .png")

@@ -73,7 +73,7 @@ def object_at(
     """The name of the object at a point (x, y) from the top left, in units of the picture, or None."""
     params = launch_params(tables, settings)
     camera = params["camera"]
-    # A picture of one pixel, whose centre is the point.
+    # The point is the centre of a picture of one pixel.
     camera["forward"] += (2 * point[0] - 1) * camera["right"] + (1 - 2 * point[1]) * camera["up"]
     params["width"] = params["height"] = params["tile_size"] = 1
     _, object_ids = _traced(tracer, tables, one_slot(), params)

@@ -43,7 +43,7 @@ class PathBuffer:
         most = _MOST_FLOATS // self.planes
         stride = _stride(max(1, slots), tile_size)
         if stride > self.stride and self.stride < most:
-            # Room to spare, since callers come back for a little more each time.
+            # Twice the room is made, because callers come back for a little more each time.
             with suppress(DeviceError):
                 return self._made(device, self.planes, min(2 * stride, most))
         return self

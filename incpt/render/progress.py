@@ -63,12 +63,13 @@ class Progress:
         self,
         old: Scene,
         scene: Scene,
+        change: Change,
         film: FilmSums,
         since: Scene | None = None,
         pixel: tuple[float, float] | None = None,
     ) -> Progress:
-        """What follows from an edit that made `scene` of `old`; see `Session.edit`."""
-        change = diff(old, scene)
+        """What follows from an edit that made `scene` of `old`, which differ by `change`; see
+        `Session.edit`."""
         if change.is_global:
             return self.entering(self._next_mode(Event.GLOBAL_CHANGE), scene, film)
         changed = affected_objects(old, scene, change)
@@ -121,5 +122,5 @@ class Progress:
 
 def _affected_locally(since: Scene, scene: Scene) -> tuple[Object, ...]:
     """What looks different since a scene; nothing where everything does."""
-    change: Change = diff(since, scene)
+    change = diff(since, scene)
     return () if change.is_global else tuple(affected_objects(since, scene, change))

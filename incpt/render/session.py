@@ -174,8 +174,8 @@ class Session:
         in where the object was before the drag. `end_drag` ends it.
         """
         state = self._state if settings is None else self._configured(settings)
-        progress = state.progress.after_edit(self.scene, scene, state.film, since, pixel)
         change = diff(self.scene, scene)
+        progress = state.progress.after_edit(self.scene, scene, change, state.film, since, pixel)
         self._state = replace(state, progress=progress, tables=self._tables_of(scene))
         return change
 

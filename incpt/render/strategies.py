@@ -6,7 +6,8 @@ A strategy has three jobs, and a session asks it for nothing else:
 2. the *samples* of each tile in that queue,
 3. how what a step traced is *merged* into the film, and which picture the film then shows.
 
-What each of them may use stands at its method.
+What each of them may use stands at its method. A queue may be shorter than a step, which ends with it: so a
+strategy that allocates by what it has measured plans short queues, and is asked again at the end of each.
 
 Strategies are found by name in `STRATEGIES_BY_NAME`; nobody else compares names. They keep no state of their
 own, because a session that meets an error goes back to the values that it had before: what a strategy has to

@@ -218,7 +218,7 @@ def is_done(side: Side, target_spp: int | None) -> bool:
 
 def _follow(situation: Situation, place: int) -> Follow:
     view, side = situation.view, situation.sides[place]
-    # Beside a picture that is kept, one that starts over is to be seen as it is.
+    # A picture that starts over beside one that is kept is shown as it is, so that they can be compared.
     with_preview = not view.paused and (side is situation.main or situation.main.divisor > 1)
     divisor = side.divisor
     if with_preview and _starts_over(side, view):
@@ -227,7 +227,7 @@ def _follow(situation: Situation, place: int) -> Follow:
     pixel = None
     if view.point is not None:
         pixel = (view.point[0] * settings.size[0], view.point[1] * settings.size[1])
-    # The tiles of a drag have fewer samples, which its end makes up for.
+    # In a drag tiles get fewer samples than the settings say, which its end makes up for.
     ends_drag = view.before is None and settings.nor > side.progress.settings.nor
     since = side.view.before if ends_drag else view.before
     return Follow(place, view, divisor, settings, pixel, since if divisor == 1 else None, ends_drag)
@@ -289,7 +289,7 @@ def settings_of(view: View, strategy: str | None, whole: Pace, divisor: int) -> 
     settings, (width, height) = view.scene.settings, view.size
     nor = settings.nor
     if view.before is not None:
-        # A tile is to fit a step, also where tiles are large.
+        # The repetitions of one tile have to fit a step, also where tiles are large.
         per_tile = settings.tile_size**2 * settings.sample_rate
         fitting = int(whole.speed * view.step_ms / 1e3 / per_tile)
         nor = min(nor, view.drag_nor, max(fitting, 1))
@@ -311,7 +311,7 @@ def fitting_divisor(view: View, whole: Pace, now: int) -> int:
     share = paths / whole.speed / (view.step_ms / 1e3)
     if share <= 1.4:
         return 1
-    # From here on one path per pixel.
+    # A coarse picture has one path for each pixel, whatever the settings say.
     share = width * height / whole.speed / (view.step_ms / 1e3)
     divisor = max(now, 2)
     while divisor < COARSEST and share / divisor**2 > 1.4:
@@ -357,8 +357,7 @@ def _known_costs(side: Side) -> TileCosts:
     return side.costs if is_known else TileCosts.unknown(grid)
 
 
-# ------------------------------------------------------------------------------------------ what is known
-# then
+# ------------------------------------------------------------------------------------------ what follows
 
 
 def followed(side: Side, work: Follow, progress: Progress, now: float) -> Side:

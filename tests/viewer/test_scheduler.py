@@ -16,6 +16,7 @@ from incpt.render.plan import Cursor, Queue
 from incpt.render.progress import Progress
 from incpt.render.session import StepReport
 from incpt.render.tiles import TileGrid
+from incpt.scene.change import diff
 from incpt.scene.model import Scene
 from incpt.viewer import scheduler
 from incpt.viewer.pace import Pace, TileCosts
@@ -206,7 +207,7 @@ def test_a_change_is_begun_unless_it_changes_nothing() -> None:
     same = scheduler.followed(side, work, side.progress, NOW)
     assert same.view is work.view is same.full_view
     assert (same.seconds, same.is_answered, same.changed_at) == (3.0, True, NOW - 10)
-    edited = side.progress.after_edit(scene, work.view.scene, NoFilm())
+    edited = side.progress.after_edit(scene, work.view.scene, diff(scene, work.view.scene), NoFilm())
     begun = scheduler.followed(side, work, edited, NOW)
     assert (begun.seconds, begun.nonfinite, begun.pass_paths, begun.is_answered) == (0.0, 0, 0, False)
     assert begun.changed_at == NOW and begun.urgent == begun.version > side.version
