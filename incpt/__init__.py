@@ -30,6 +30,7 @@ from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
+from incpt.scene.transform import Transform
 
 __all__ = [
     "Aovs",
@@ -50,6 +51,7 @@ __all__ = [
     "Scene",
     "Session",
     "StepReport",
+    "Transform",
     "diff",
     "load",
     "load_image",

@@ -38,7 +38,7 @@ MAX_STEP = 10_000_000
 _FILE_KEYS = ("capture", "cumulative", "edits")
 _EDIT_KEYS = ("name", "step", "pixel", "capture")
 _VALUE_KEYS: dict[str, tuple[str, ...]] = {
-    "object": ("position", "rotation", "scale", "visible", "material", "shape", "mesh", "part"),
+    "object": ("position", "rotation", "scale", "matrix", "visible", "material", "shape", "mesh", "part"),
     "material": tuple(field.name for field in fields(Material)),
     "camera": tuple(field.name for field in fields(Camera)),
     "environment": ("color", "image", "rotation_y", "intensity"),

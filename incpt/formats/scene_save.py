@@ -157,8 +157,9 @@ def _environment_table(environment: Environment, beside: _Beside) -> dict[str, A
 
 def _object_table(obj: Object, beside: _Beside) -> dict[str, Any]:
     table: dict[str, Any] = {"name": obj.name, **beside.mesh(obj.mesh, obj.name), "material": obj.material}
-    for name in ("position", "rotation", "scale"):
-        table[name] = _toml(getattr(obj, name))
+    names = ("position", "rotation", "scale") if obj.transform.matrix is None else ("matrix",)
+    for name in names:
+        table[name] = _toml(getattr(obj.transform, name))
     if not obj.visible:
         table["visible"] = False
     return table
@@ -174,4 +175,4 @@ def _changed(owner: Any) -> dict[str, Any]:
 
 
 def _toml(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
+    return [_toml(item) for item in value] if isinstance(value, tuple) else value

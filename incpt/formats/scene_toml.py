@@ -28,7 +28,8 @@ VERSION = 1
 _TABLES = ("version", "camera", "environment", "render", "materials", "objects")
 CAMERA_KEYS = ("position", "target", "up", "fov_y")
 _ENVIRONMENT_KEYS = ("color", "image", "rotation_y", "intensity")
-_OBJECT_KEYS = ("name", "shape", "mesh", "part", "material", "position", "rotation", "scale", "visible")
+_PLACEMENT_KEYS = ("position", "rotation", "scale", "matrix")
+_OBJECT_KEYS = ("name", "shape", "mesh", "part", "material", *_PLACEMENT_KEYS, "visible")
 _MATERIAL_KEYS = tuple(field.name for field in fields(Material))
 
 
@@ -112,7 +113,7 @@ def _object(table: dict[str, Any], materials: Mapping[str, Material], library: M
         close = get_close_matches(material, materials, 1)
         hint = f"did you mean {close[0]!r}?" if close else f"add [materials.{material}]"
         raise InputError(f"material: {material!r} is not in [materials]; {hint}")
-    placement = {k: v for k, v in table.items() if k in ("position", "rotation", "scale", "visible")}
+    placement = {k: v for k, v in table.items() if k in (*_PLACEMENT_KEYS, "visible")}
     meshes = library.meshes(table)
     names = [name] if len(meshes) == 1 else [f"{name}/{part}" for part, _ in meshes]
     return [Object(n, mesh, material, **placement) for n, (_, mesh) in zip(names, meshes, strict=True)]

@@ -76,11 +76,7 @@ def diff(old: Scene, new: Scene) -> Change:
         added=frozenset(after.keys() - before.keys()),
         removed=frozenset(before.keys() - after.keys()),
         reordered=[n for n in before if n in after] != [n for n in after if n in before],
-        moved=frozenset(
-            name
-            for name, a, b in pairs
-            if (a.position, a.rotation, a.scale, a.visible) != (b.position, b.rotation, b.scale, b.visible)
-        ),
+        moved=frozenset(name for name, a, b in pairs if (a.transform, a.visible) != (b.transform, b.visible)),
         deformed=frozenset(
             name for name, a, b in pairs if a.mesh is not b.mesh and is_deformation(a.mesh, b.mesh)
         ),
@@ -123,7 +119,7 @@ def _touched(scene: Scene, names: frozenset[str], materials: frozenset[str]) -> 
 
 def _look(scene: Scene, obj: Object) -> tuple[object, ...]:
     # A mesh is itself only, see Mesh.
-    return id(obj.mesh), obj.position, obj.rotation, obj.scale, scene.materials[obj.material]
+    return id(obj.mesh), obj.transform, scene.materials[obj.material]
 
 
 def _without(scene: Scene, objects: list[Object], same: Counter[tuple[object, ...]]) -> list[Object]:

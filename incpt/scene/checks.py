@@ -24,7 +24,7 @@ def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 def set_number(owner: object, name: str, low: float, high: float) -> None:
     """Replaces an attribute of a frozen dataclass by a float within bounds. Raises InputError."""
-    object.__setattr__(owner, name, _number(name, getattr(owner, name), low, high))
+    object.__setattr__(owner, name, checked_number(name, getattr(owner, name), low, high))
 
 
 def set_vector(owner: object, name: str, low: float = -LARGEST, high: float = LARGEST) -> None:
@@ -32,10 +32,11 @@ def set_vector(owner: object, name: str, low: float = -LARGEST, high: float = LA
     value = getattr(owner, name)
     if isinstance(value, str) or not isinstance(value, (Sequence, np.ndarray)) or len(value) != 3:
         raise InputError(f"{name}: {value!r} is not a list of three numbers")
-    object.__setattr__(owner, name, tuple(_number(name, v, low, high) for v in value))
+    object.__setattr__(owner, name, tuple(checked_number(name, v, low, high) for v in value))
 
 
-def _number(name: str, value: Any, low: float, high: float) -> float:
+def checked_number(name: str, value: Any, low: float, high: float) -> float:
+    """A number of Python or numpy as a float from `low` to `high`. Raises InputError that names it `name`."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise InputError(f"{name}: {value!r} is not a number")
     try:

@@ -20,8 +20,9 @@ from incpt.core.transform import Vector
 from incpt.scene.checks import LARGEST
 from incpt.scene.material import Material
 from incpt.scene.mesh_part import MeshPart
-from incpt.scene.model import SMALLEST_SCALE, Object, Scene
+from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
+from incpt.scene.transform import SMALLEST_SCALE, Transform
 
 Names = tuple[str, ...]
 
@@ -146,8 +147,9 @@ def transform_objects(
     Give the scene from before the drag and the whole movement since then, so that rounding does not add up.
     Rotations stay near what they were and scales keep their signs; what is not turned keeps its angles and
     what is not scaled its scale, to the bit. Shear, which a scaled group of turned objects would get, is
-    dropped (`transform.decompose`). Numbers out of the scene's range are brought back into it, and an
-    object that would be flattened stays as it was. Raises InputError for unknown names.
+    dropped (`transform.decompose`), but where an object has a matrix, which then is just multiplied. Numbers
+    out of the scene's range are brought back into it, and an object that would be flattened stays as it was.
+    Raises InputError for unknown names.
     """
     matrix = np.asarray(delta, np.float64)
     about = np.asarray(pivot, np.float64)
@@ -246,26 +248,40 @@ def _with_brought(scene: Scene, name: str, material: Material) -> tuple[Scene, s
 def _standing_on(at: Sequence[float], bounds: npt.NDArray[np.floating[Any]]) -> Vector:
     """The position at which a box stands with the middle of its bottom on a point."""
     low, high = np.asarray(bounds, np.float64)
-    x, y, z = (float(v) for v in np.asarray(at) - [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-    return x, y, z
+    return _vector(np.asarray(at) - [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
 
 
 def _placed(obj: Object, world: npt.NDArray[np.float64], turn: npt.NDArray[np.float64]) -> Object:
-    """An object under another matrix, which `turn` (3, 3) made of its own."""
-    position = _within(world[:, 3])
+    """An object under another matrix (3, 4), which `turn` (3, 3) made of its own."""
+    world = np.column_stack([world[:, :3], _within(world[:, 3])])
+    if obj.transform.matrix is None:
+        placed = _without_shear(obj.transform, world, turn)
+    else:
+        try:
+            placed = obj.transform.moved_to(world)
+        except InputError:
+            placed = obj.transform
+    return replace(obj, transform=placed)
+
+
+def _without_shear(
+    old: Transform, world: npt.NDArray[np.float64], turn: npt.NDArray[np.float64]
+) -> Transform:
+    """Position, rotation and scale nearest to a matrix (3, 4), which `turn` (3, 3) made of the old one; the
+    old ones themselves as far as they stay the same, and where the matrix flattens the object."""
+    position = _vector(world[:, 3])
     if np.abs(turn - np.eye(3)).max() < _RIGID:
-        return replace(obj, position=position)
+        return replace(old, position=position)
     try:
-        _, rotation, scale = transform.decompose(world, obj.rotation, obj.scale)
+        _, rotation, scale = transform.decompose(world, old.rotation, old.scale)
     except np.linalg.LinAlgError:
-        return obj
+        return old
     is_turned_only = np.abs(turn @ turn.T - np.eye(3)).max() < _RIGID and np.linalg.det(turn) > 0
-    is_scaled_only = np.abs(np.subtract(rotation, obj.rotation)).max() < _SAME_ROTATION_DEG
-    return replace(
-        obj,
-        position=position,
-        rotation=obj.rotation if is_scaled_only else rotation,
-        scale=obj.scale if is_turned_only else _within(scale, SMALLEST_SCALE),
+    is_scaled_only = np.abs(np.subtract(rotation, old.rotation)).max() < _SAME_ROTATION_DEG
+    return Transform(
+        position,
+        old.rotation if is_scaled_only else rotation,
+        old.scale if is_turned_only else _within(scale, SMALLEST_SCALE),
     )
 
 
@@ -273,5 +289,9 @@ def _within(values: Sequence[float] | npt.NDArray[np.float64], smallest: float =
     """Three numbers brought into the range that a scene allows."""
     numbers = np.asarray(values, np.float64)
     sizes = np.clip(np.abs(numbers), smallest, LARGEST)
-    x, y, z = (float(v) for v in np.copysign(sizes, numbers))
+    return _vector(np.copysign(sizes, numbers))
+
+
+def _vector(values: npt.NDArray[np.float64]) -> Vector:
+    x, y, z = (float(v) for v in values)
     return x, y, z

@@ -1,4 +1,4 @@
-"""The immutable scene, and the difference between two of them.
+"""The immutable scene and its objects.
 
 An edit makes a new Scene that shares whatever did not change, so comparing parts by identity first
 makes `diff` cheap, undo is a list of scenes, and nobody has to set a flag that could be forgotten.
@@ -21,47 +21,79 @@ from incpt.core.layout import MEDIUM_NONE
 from incpt.core.settings import RenderSettings
 from incpt.core.transform import Vector
 from incpt.scene.camera import Camera
-from incpt.scene.checks import set_vector
 from incpt.scene.environment import Environment
 from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh
+from incpt.scene.transform import IDENTITY, Transform
 
-SMALLEST_SCALE = 1e-6
+_PLACEMENT = ("position", "rotation", "scale", "matrix")
+"""Keywords of an object that stand for parts of its transform."""
 
 
 @dataclass(frozen=True)
 class Object:
-    """An instance of a mesh: material by name; position in metres, rotation in degrees (about x, then y,
-    then z: R = Rz · Ry · Rx), scale by axis."""
+    """An instance of a mesh: `material` is the name of one in the scene, `transform` says where it stands.
+
+    The transform may be given as a whole, as `position` (metres), `rotation` (degrees) and `scale`, or as a
+    `matrix`: (3, 4) or (4, 4), affine. These take the place of parts of the transform, as
+    `Transform.with_parts` does it, also in `dataclasses.replace` and `Scene.with_object`. Raises InputError.
+    """
 
     name: str
     mesh: Mesh
     material: str
-    position: Vector = (0.0, 0.0, 0.0)
-    rotation: Vector = (0.0, 0.0, 0.0)
-    scale: Vector = (1.0, 1.0, 1.0)
-    visible: bool = True
+    transform: Transform
+    visible: bool
 
-    def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not self.name:
-            raise InputError(f"name: {self.name!r} is not a name; give the object a text")
-        if not isinstance(self.mesh, Mesh):
-            raise InputError(f"mesh: {self.mesh!r} is not a Mesh; use shape() or load_mesh()")
-        if not isinstance(self.material, str):
-            raise InputError(f"material: {self.material!r} is not the name of a material")
-        if not isinstance(self.visible, bool):
-            raise InputError(f"visible: {self.visible!r} is not true or false")
-        for name in ("position", "rotation", "scale"):
-            set_vector(self, name)
-        if min(abs(s) for s in self.scale) < SMALLEST_SCALE:
-            raise InputError(
-                f"scale: {list(self.scale)} flattens the object; use at least {SMALLEST_SCALE:g}"
-            )
+    def __init__(
+        self,
+        name: str,
+        mesh: Mesh,
+        material: str,
+        position: Vector | None = None,
+        rotation: Vector | None = None,
+        scale: Vector | None = None,
+        visible: bool = True,
+        *,
+        matrix: npt.ArrayLike | None = None,
+        transform: Transform = IDENTITY,
+    ) -> None:
+        if not isinstance(name, str) or not name:
+            raise InputError(f"name: {name!r} is not a name; give the object a text")
+        if not isinstance(mesh, Mesh):
+            raise InputError(f"mesh: {mesh!r} is not a Mesh; use shape() or load_mesh()")
+        if not isinstance(material, str):
+            raise InputError(f"material: {material!r} is not the name of a material")
+        if not isinstance(visible, bool):
+            raise InputError(f"visible: {visible!r} is not true or false")
+        if not isinstance(transform, Transform):
+            raise InputError(f"transform: {transform!r} is not a Transform")
+        placed = transform.with_parts(position, rotation, scale, matrix)
+        values = {
+            "name": name, "mesh": mesh, "material": material, "transform": placed, "visible": visible,
+        }  # fmt: skip
+        for key, value in values.items():
+            object.__setattr__(self, key, value)
 
-    @cached_property
+    @property
+    def position(self) -> Vector:
+        """Of the mesh's origin in world space, metres."""
+        return self.transform.position
+
+    @property
+    def rotation(self) -> Vector:
+        """Degrees about x, then y, then z; of a matrix the nearest, see Transform."""
+        return self.transform.rotation
+
+    @property
+    def scale(self) -> Vector:
+        """Factors along the rotated axes; of a matrix the nearest, see Transform."""
+        return self.transform.scale
+
+    @property
     def world_from_object(self) -> npt.NDArray[np.float64]:
         """(3, 4) affine matrix."""
-        return transform.world_from_object(self.position, self.rotation, self.scale)
+        return self.transform.world_from_object
 
     @cached_property
     def world_bounds(self) -> npt.NDArray[np.float64]:
@@ -127,8 +159,9 @@ class Scene:
         return replace(self, materials={**self.materials, name: material})
 
     def with_object(self, name: str, /, **changes: Any) -> Scene:
-        """A scene with one object changed: mesh, material, position, rotation, scale, visible, name."""
-        changed = _replace(self.object(name), changes)
+        """A scene with one object changed: mesh, material, visible, name, and where it stands: `position`,
+        `rotation`, `scale`, or a `matrix`, or a whole `transform`. See Object. Raises InputError."""
+        changed = _replace(self.object(name), changes, _PLACEMENT)
         return replace(self, objects=tuple(changed if o.name == name else o for o in self.objects))
 
     def with_added(self, *objects: Object) -> Scene:
@@ -158,9 +191,11 @@ def _known(names: Iterable[str]) -> str:
     return "it has " + ", ".join(listed[:8]) + (f" and {len(listed) - 8} more" if len(listed) > 8 else "")
 
 
-def _replace(value: Any, changes: Mapping[str, Any]) -> Any:
+def _replace(value: Any, changes: Mapping[str, Any], more_keys: tuple[str, ...] = ()) -> Any:
+    known = (*value.__dataclass_fields__, *more_keys)
     for key in changes:
-        if key not in value.__dataclass_fields__:
-            known = ", ".join(value.__dataclass_fields__)
-            raise InputError(f"{key}: is no property of {type(value).__name__.lower()}; it has {known}")
+        if key not in known:
+            raise InputError(
+                f"{key}: is no property of {type(value).__name__.lower()}; it has {', '.join(known)}"
+            )
     return replace(value, **changes)

@@ -90,6 +90,14 @@ def test_edits_of_the_base_scene(tmp_path: Path) -> None:
     assert both.position == (1, 0, 0) and both.scale == (2, 2, 2)
 
 
+def test_an_edit_may_give_a_matrix(tmp_path: Path) -> None:
+    rows = [[1, 0.5, 0, 1], [0, 2, 0, 2], [0, 0, 1, 3]]
+    script = load_text(tmp_path, BALL + f"matrix = {rows}\n" + BALL + "position = [7, 8, 9]\n")
+    first, second = (scene.object("ball").world_from_object for scene in script.scenes(SCENE))
+    np.testing.assert_array_equal(first, rows)
+    np.testing.assert_array_equal(second, np.column_stack([np.array(rows)[:, :3], [7, 8, 9]]))
+
+
 BALL = "[[edits]]\nobject = 'ball'\n"
 
 

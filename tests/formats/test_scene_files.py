@@ -29,6 +29,7 @@ from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh, MeshSource
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
+from incpt.scene.transform import Transform
 
 SCENES = Path(__file__).parents[2] / "scenes"
 VALID = """
@@ -45,6 +46,7 @@ shape = "cube"
 material = "red"
 position = [0, 0.5, 0]
 """
+SHEARED = [[1.0, 0.1, 0.2, 0.3], [0.0, 1.0, 1 / 3, 2.0], [0.0, -0.7, 1.1, -1e-7]]
 
 
 @pytest.fixture(autouse=True)
@@ -85,6 +87,37 @@ def test_a_scene_file_gives_what_it_says(tmp_path: Path) -> None:
     cube = scene.object("red cube")
     assert cube.mesh is shape("cube") and cube.scale == (1, 2, 1) and not cube.visible
     assert scene.material("a lamp") == Material(emission=(1, 2, 3), double_sided=True, priority=2)
+
+
+@pytest.mark.parametrize("rows", [SHEARED, [*SHEARED, [0, 0, 0, 1]]])
+def test_an_object_may_stand_by_a_matrix(tmp_path: Path, rows: list[list[float]]) -> None:
+    scene = load_text(tmp_path, VALID.replace("position = [0, 0.5, 0]", f"matrix = {rows}"))
+    cube = scene.object("red cube")
+    np.testing.assert_array_equal(cube.world_from_object, SHEARED)
+    scene_save.save(scene, tmp_path / "b.toml")
+    text = (tmp_path / "b.toml").read_text()
+    assert "matrix" in text and "rotation" not in text.split("[[objects]]")[1]
+    again = registry.load(tmp_path / "b.toml")
+    assert_same(again, scene)
+    assert not diff(scene, again).is_local and again.object("red cube").transform.matrix == tuple(
+        map(tuple, SHEARED)
+    )
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("matrix = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]\nscale = [1, 2, 1]", "stands beside .*scale"),
+        ("matrix = [[1, 0, 0, 0], [0, 0, 0, 0], [0, 0, 1, 0]]", "flattens the object"),
+        ("matrix = [[1, 0, 0, 0], [0, inf, 0, 0], [0, 0, 1, 0]]", "inf is not a finite number"),
+        ("matrix = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 1, 1]]", "its last row is"),
+        ('matrix = "upright"', "is not a list of rows"),
+    ],
+)
+def test_a_bad_matrix_is_told_where_it_stands(tmp_path: Path, line: str, message: str) -> None:
+    text = VALID.replace("position = [0, 0.5, 0]", line)
+    with pytest.raises(InputError, match=rf'\[\[objects\]\] 1 \("red cube"\): matrix: .*{message}'):
+        load_text(tmp_path, text)
 
 
 def test_an_image_without_a_color_is_taken_as_it_is(tmp_path: Path) -> None:
@@ -383,15 +416,22 @@ materials_strategy = st.builds(
 def scenes(draw: st.DrawFn) -> Scene:
     materials = draw(st.dictionaries(names, materials_strategy, min_size=1, max_size=3))
     side = st.one_of(st.floats(1e-6, LARGEST), st.floats(-LARGEST, -1e-6))
+    shear = st.floats(-2, 2)
+    placements = st.one_of(
+        st.builds(Transform, vectors, vectors, st.tuples(side, side, side)),
+        st.builds(
+            lambda x, y, z, a, b, c: Transform.from_matrix([[1, a, b, x], [0, 1, c, y], [0, 0, -1, z]]),
+            *[numbers] * 3,
+            *[shear] * 3,
+        ),
+    )
     objects = [
         Object(
             name,
             shape(draw(st.sampled_from(["cube", "plane"]))),
             draw(st.sampled_from(sorted(materials))),
-            draw(vectors),
-            draw(vectors),
-            draw(st.tuples(side, side, side)),
-            draw(st.booleans()),
+            transform=draw(placements),
+            visible=draw(st.booleans()),
         )
         for name in draw(st.lists(names, unique=True, max_size=3))
     ]

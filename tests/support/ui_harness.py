@@ -24,6 +24,7 @@ from incpt.render.modes import Mode
 from incpt.scene.image import Image
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Scene
+from incpt.scene.transform import Transform
 from incpt.ui.commands import command, menus, table
 from incpt.ui.editor.document import Document
 from incpt.ui.editor.editor import Editor
@@ -307,7 +308,9 @@ def flat(value: Any, place: str = "") -> dict[str, Any]:
         return {place: value}
     found: dict[str, Any] = {}
     for name, one in parts:
-        found.update(flat(one, f"{place}.{name}" if place else name))
+        # The parts of a transform are found at the object, which has them by these names too.
+        below = place if isinstance(one, Transform) else f"{place}.{name}" if place else name
+        found.update(flat(one, below))
     return found
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from incpt.scene import edits
-from incpt.scene.model import Object
 from incpt.scene.selection import Selection
+from incpt.scene.transform import IDENTITY
 from incpt.ui.dialogs.text_field import TextField
 from incpt.ui.editor.editor import Editor
 
@@ -60,7 +60,5 @@ def reset_transform(editor: Editor) -> None:
     """The selected objects at the origin, unturned, at their mesh's own size."""
     scene = editor.scene
     for name in editor.selection.names:
-        scene = scene.with_object(
-            name, position=Object.position, rotation=Object.rotation, scale=Object.scale
-        )
+        scene = scene.with_object(name, transform=IDENTITY)
     editor.propose(scene, "Reset transform")

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from incpt.core.transform import Vector
 from incpt.scene.model import Object
+from incpt.scene.transform import Transform
 from incpt.ui.widgets import widgets
 from incpt.ui.widgets.refusals import Refusals
 
@@ -40,7 +41,7 @@ def _reset_buttons(obj: Object) -> Object:
         for i, name in enumerate(("position", "rotation", "scale")):
             if i > 0:
                 widgets.same_line()
-            default = getattr(Object, name)
+            default = getattr(Transform, name)
             if widgets.button(name.capitalize(), enabled=getattr(obj, name) != default):
                 obj = replace(obj, **{name: default})
     return obj

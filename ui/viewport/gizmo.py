@@ -104,12 +104,13 @@ class Gizmo:
 
 
 def pivot(scene: Scene, names: tuple[str, ...], space: str) -> Matrix:
-    """(4, 4) where the handles stand: the object's own matrix; for several objects the mean of their
-    positions with the axes of the active one (local) or of the world."""
+    """(4, 4) where the handles stand: the object's own matrix, without shear, which ImGuizmo would take out
+    of what it returns; for several objects the mean of their positions with the axes of the active one
+    (local) or of the world."""
     active = scene.object(names[-1])
     matrix = np.eye(4)
     if len(names) == 1:
-        matrix[:3] = active.world_from_object
+        matrix[:3] = transform.world_from_object(active.position, active.rotation, active.scale)
     else:
         if space == "local":
             matrix[:3, :3] = transform.rotation_matrix(active.rotation)

@@ -1,0 +1,42 @@
+"""Where the gizmo's handles stand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from incpt.scene import edits
+from incpt.scene.material import Material
+from incpt.scene.model import Object, Scene
+from incpt.scene.shapes import shape
+from incpt.ui.viewport import gizmo
+
+SHEARED = np.array([[1.0, 0.5, 0.0, 3.0], [0.0, 2.0, 0.25, -1.0], [0.1, 0.0, 1.5, 2.0]])
+SCENE = Scene(
+    materials={"red": Material()},
+    objects=(
+        Object("cube", shape("cube"), "red", (1, 2, 3), (10, 20, 30), (1, 2, -3)),
+        Object("odd", shape("cube"), "red", matrix=SHEARED),
+    ),
+)
+
+
+def test_handles_stand_at_the_matrix_of_an_object() -> None:
+    np.testing.assert_array_equal(
+        gizmo.pivot(SCENE, ("cube",), "local")[:3], SCENE.objects[0].world_from_object
+    )
+
+
+def test_handles_of_a_sheared_object_are_at_right_angles_and_keep_its_shear() -> None:
+    """ImGuizmo makes the axes of its matrix orthogonal: it must be given none that are not."""
+    start = gizmo.pivot(SCENE, ("odd",), "local")
+    products = start[:3, :3].T @ start[:3, :3]
+    np.testing.assert_allclose(products, np.diag(np.diag(products)), atol=1e-12)
+    assert tuple(start[:3, 3]) == SCENE.object("odd").position
+    # What a scaling by the handle of x returns.
+    delta = start @ np.diag([2.0, 1.0, 1.0, 1.0]) @ np.linalg.inv(start)
+    scaled = edits.transform_objects(SCENE, ("odd",), delta).object("odd")
+    assert scaled.scale == pytest.approx(np.multiply(SCENE.object("odd").scale, (2, 1, 1)), rel=0.2)
+    np.testing.assert_allclose(
+        scaled.world_from_object, delta[:3, :3] @ SHEARED + [[0, 0, 0, x] for x in delta[:3, 3]]
+    )
