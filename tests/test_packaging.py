@@ -86,6 +86,49 @@ def test_importing_incpt_opens_no_window_library() -> None:
     assert not loaded & (WINDOW | {"incpt.ui", "incpt.benchmarks"})
 
 
+LATE = ("trimesh", "scipy", "OpenEXR", "PIL", "tomlkit", "rich", "typer")
+"""Libraries that only some files and the command line need."""
+
+
+def test_importing_incpt_loads_no_library_of_files_or_terminals() -> None:
+    code = f"import sys, incpt; print(*sorted(set({LATE}) & set(sys.modules)))"
+    found = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert found.split() == []
+
+
+WITHOUT_LIBRARIES = f"""
+import sys
+
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in {LATE}:
+            raise ModuleNotFoundError(f"no {{name}}", name=name)
+
+sys.meta_path.insert(0, Missing())
+import incpt
+
+lamp = incpt.Material(emission=(1, 1, 1))
+scene = incpt.Scene(
+    incpt.Camera((0, 0, 3), (0, 0, 0)),
+    materials={{"lamp": lamp}},
+    objects=[incpt.Object("cube", incpt.shape("cube"), "lamp")],
+)
+session = incpt.Session(scene, size=(16, 16))
+session.render(spp=1)
+print(session.image()[8, 8, 0], incpt.tone_map(session.image()).shape)
+try:
+    incpt.write_png("a.png", session.image())
+except ModuleNotFoundError as error:
+    print(error)
+"""
+
+
+def test_a_scene_made_in_python_is_rendered_without_these_libraries(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", WITHOUT_LIBRARIES]
+    run = subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True)
+    assert run.stdout.splitlines() == ["1.0 (16, 16, 3)", "no PIL"]
+
+
 def test_no_module_names_the_window() -> None:
     for path in (ROOT / "incpt").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):

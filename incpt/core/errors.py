@@ -34,6 +34,12 @@ def one_line(text: object) -> str:
     return line if len(line) <= LONGEST_MESSAGE else line[: LONGEST_MESSAGE - 2] + " …"
 
 
+def reason_of(error: Exception) -> str:
+    """What an exception of a library says, in a few words for a message."""
+    text = one_line(error)[:120].rstrip(".")
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
 @contextmanager
 def in_place(place: str) -> Iterator[None]:
     """Puts `place: ` before the message of any InputError raised inside: file, then table, then key."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-import trimesh
 
 from incpt.core.errors import InputError
 from incpt.scene.checks import LARGEST
@@ -14,30 +13,20 @@ DEGENERATE = 1e-12
 """Twice the area of a face over its longest edge squared: below it the face has no normal to speak of."""
 
 
-def placed_mesh(
-    geometry: trimesh.Trimesh, matrix: npt.NDArray[np.float64], counts: dict[str, int], with_normals: bool
+def usable_mesh(
+    vertices: npt.NDArray[np.float64],
+    faces: npt.NDArray[np.int64],
+    normals: npt.NDArray[np.float64] | None,
+    counts: dict[str, int],
 ) -> Mesh | None:
-    """The geometry in the space of the file, without its unusable faces, which are added to `counts`."""
-    vertices = np.asarray(geometry.vertices, np.float64)
-    faces = np.asarray(geometry.faces, np.int64)
+    """A mesh of the faces that can be rendered, or None if there is none.
+
+    `vertices` (V, 3), `faces` (F, 3) and `normals` (V, 3) at the vertices, of any length, or None for flat
+    faces, may hold whatever a damaged file does. `counts` gets, by the words of a message, how many faces
+    were left out, and under "in all" how many there were. Raises InputError: arrays of other shapes.
+    """
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
         raise InputError("has vertices without three coordinates; the file is damaged")
-    normals: npt.NDArray[np.float64] | None = None
-    # Normals stand in the cache only where the loader put them; the property makes them up.
-    if with_normals and "vertex_normals" in geometry._cache:
-        normals = np.asarray(geometry.vertex_normals, np.float64)
-        normals = normals if normals.shape == vertices.shape else None
-    if not np.array_equal(matrix, np.eye(4)):
-        with np.errstate(all="ignore"):
-            linear = matrix[:3, :3]
-            vertices = vertices @ linear.T + matrix[:3, 3]
-            if normals is not None:
-                # The cofactor matrix is det · inverse transpose, and exists for flat placements too.
-                x, y, z = linear.T
-                cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=1)
-                normals = normals @ cofactors.T * np.sign(np.linalg.det(linear))
-            if np.linalg.det(linear) < 0:
-                faces = faces[:, ::-1]
     with np.errstate(all="ignore"):
         stored = vertices.astype(np.float32)
     usable = _usable_faces(stored, faces, counts)

@@ -24,6 +24,7 @@ from types import MappingProxyType
 from typing import Any
 
 from incpt.core.errors import InputError, in_place
+from incpt.core.files import check_readable
 from incpt.formats import images
 from incpt.formats.mesh_library import MeshLibrary
 from incpt.formats.toml_kit import check_keys, quoted, read_toml, text_of
@@ -105,8 +106,9 @@ def load_edits(path: str | os.PathLike[str], scene: Scene) -> EditScript:
     Raises InputError, one line that names the file, the number of the edit and the key.
     """
     path = Path(path)
-    tables = read_toml(path)
+    check_readable(path)
     with in_place(str(path)):
+        tables = read_toml(path)
         check_keys(tables, _FILE_KEYS, "table or key")
         cumulative = tables.get("cumulative", True)
         if not isinstance(cumulative, bool):

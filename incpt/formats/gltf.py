@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from incpt.core.errors import InputError
+from incpt.core.errors import InputError, reason_of
 from incpt.core.files import check_readable, read_bytes
-from incpt.formats.obj import hint
 from incpt.scene.material import Material
 
 MAX_UNSTORED_ITEMS = 100_000_000
@@ -36,7 +35,7 @@ def gltf_header(path: Path, suffix: str) -> dict[str, Any]:
     except InputError:
         raise
     except Exception as error:  # JSON of any shape: a list for a table, a text for a number …
-        raise InputError(f"is no {suffix.upper()} mesh, or a damaged one ({hint(error)})") from None
+        raise InputError(f"is no {suffix.upper()} mesh, or a damaged one ({reason_of(error)})") from None
     result: dict[str, Any] = header
     return result
 

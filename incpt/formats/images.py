@@ -1,9 +1,7 @@
 """Pictures on disk: OpenEXR (linear radiance, any layers) and PNG (tone-mapped sRGB).
 
-The display curve "agx" is AgX by Troy Sobotka in the polynomial form of Benjamin Wrensch ("Minimal AgX
-Implementation", iolite-engine.com, 2023), the default look of Blender 4: bright colours run into white
-instead of clipping to a primary, and greys stay grey. "filmic" is the curve of John Hable ("Filmic
-Tonemapping Operators", filmicgames.com, 2010) for each channel alone: more contrast, saturated highlights.
+OpenEXR and Pillow are imported by the functions that read or write a file, because most programs that
+import incpt do neither before they have rendered something.
 """
 
 from __future__ import annotations
@@ -20,12 +18,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import OpenEXR
-import PIL.Image
 
-from incpt.core.errors import InputError, in_place, one_line
+from incpt.core.errors import InputError, one_line
 from incpt.core.files import check_readable, write_atomically, write_bytes
 from incpt.core.layout import ENVIRONMENT_MAX_SIZE
+from incpt.formats import registry
+from incpt.formats.registry import OPENEXR, FileKind
 from incpt.picture.tone_mapping import tone_map
 from incpt.scene.image import Image
 
@@ -46,6 +44,8 @@ def write_png(
     pixels = tone_map(image, exposure, curve)
     if pixels.ndim != 3 or pixels.size == 0:
         raise InputError(f"image: has shape {pixels.shape}; a picture has shape (height, width, 3)")
+    import PIL.Image
+
     encoded = io.BytesIO()
     PIL.Image.fromarray(pixels).save(encoded, "PNG")
     write_bytes(Path(path), encoded.getvalue())
@@ -65,6 +65,8 @@ def write_exr(path: str | os.PathLike[str], layers: Mapping[str, npt.NDArray[Any
     shapes = {channel.shape for channel in channels.values()}
     if len(shapes) != 1 or 0 in next(iter(shapes)):
         raise InputError(f"layers: have sizes {sorted(shapes)}; a picture needs layers of one size")
+    import OpenEXR
+
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
 
     def write(temporary: Path) -> None:
@@ -102,10 +104,15 @@ def load_image(path: str | os.PathLike[str]) -> Image:
     key = (os.path.realpath(path), status.st_mtime_ns, status.st_size)
     image = _images.get(key)
     if image is None:
-        with in_place(str(path)):
-            pixels = _without_ringing(_read_exr(path))
-            image = _images[key] = Image(pixels, source=os.path.abspath(path))
+        # What has no suffix of an image may be one all the same; its content is checked.
+        row = registry.format_of(path, FileKind.IMAGE) or OPENEXR
+        image = _images[key] = row.read(path)
     return image
+
+
+def read_exr(path: Path) -> Image:
+    """The image of an OpenEXR file, see `load_image`. Raises InputError that does not name the file."""
+    return Image(_without_ringing(_pixels(path)), source=os.path.abspath(path))
 
 
 def _without_ringing(pixels: Float32Image) -> Float32Image:
@@ -116,7 +123,10 @@ def _without_ringing(pixels: Float32Image) -> Float32Image:
     return pixels
 
 
-def _read_exr(path: Path) -> Float32Image:
+def _pixels(path: Path) -> Float32Image:
+    """(H, W, 3) linear radiance of an OpenEXR file. Raises InputError."""
+    import OpenEXR
+
     try:
         with _quiet():
             header = OpenEXR.File(str(path), header_only=True).header()
@@ -164,6 +174,8 @@ def _colour_names(names: set[str]) -> Iterator[tuple[str, str, str]]:
 def _quiet() -> Iterator[None]:
     """Mutes the process's stdout and stderr: OpenEXR prints each error there before it raises it, and some
     on Python's stdout, which would keep it and print it later."""
+    import OpenEXR
+
     with _quiet_lock, redirect_stdout(io.StringIO()):
         saved = []
         with suppress(OSError):  # a process started without them

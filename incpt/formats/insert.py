@@ -4,29 +4,16 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
-from enum import Enum
 from pathlib import Path
 
 from incpt.core.errors import InputError
 from incpt.core.transform import Vector
-from incpt.formats import images, mesh_files
+from incpt.formats import images, mesh_files, registry
+from incpt.formats.registry import FileKind
 from incpt.scene import edits
 from incpt.scene.edits import Names
 from incpt.scene.environment import Environment
 from incpt.scene.model import Scene
-
-SCENE_SUFFIXES = (".toml",)
-
-
-ENVIRONMENT_SUFFIXES = (".exr",)
-
-
-class FileKind(Enum):
-    """What a file that is dropped on the window is taken for."""
-
-    SCENE = "scene"
-    MESH = "mesh"
-    ENVIRONMENT = "environment"
 
 
 def add_mesh(
@@ -38,18 +25,18 @@ def add_mesh(
 
 
 def file_kind(path: str | os.PathLike[str]) -> FileKind:
-    """What a file is taken for, by its suffix. Raises InputError for a type that has no use here."""
-    suffix = Path(path).suffix.lower()
-    if suffix in SCENE_SUFFIXES:
-        return FileKind.SCENE
-    if suffix in ENVIRONMENT_SUFFIXES:
-        return FileKind.ENVIRONMENT
-    if suffix[1:] in mesh_files.mesh_suffixes():
-        return FileKind.MESH
-    raise InputError(
-        f"{path}: files of this type cannot be used; drop a scene (.toml), an environment (.exr) "
-        f"or a mesh ({mesh_files.readable_types()})"
-    )
+    """What a file that is dropped on the window is taken for, by its suffix. Raises InputError for a type
+    that has no use here."""
+    row = registry.format_of(path, *FileKind)
+    if row is None:
+        scenes, images_, meshes = (
+            registry.listed(k) for k in (FileKind.SCENE, FileKind.IMAGE, FileKind.MESH)
+        )
+        raise InputError(
+            f"{path}: files of this type cannot be used; drop a scene ({scenes}), an environment ({images_}) "
+            f"or a mesh ({meshes})"
+        )
+    return row.kind
 
 
 def drop_file(scene: Scene, path: str | os.PathLike[str]) -> tuple[Scene, Names]:
@@ -58,7 +45,7 @@ def drop_file(scene: Scene, path: str | os.PathLike[str]) -> tuple[Scene, Names]
     kind = file_kind(path)
     if kind is FileKind.MESH:
         return add_mesh(scene, path)
-    if kind is FileKind.ENVIRONMENT:
+    if kind is FileKind.IMAGE:
         return set_environment_image(scene, path), ()
     raise InputError(f"{path}: is a scene; open it in place of this one")
 

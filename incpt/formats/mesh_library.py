@@ -9,8 +9,8 @@ from typing import Any
 from incpt.core.errors import InputError, in_place
 from incpt.formats import mesh_files
 from incpt.formats.toml_kit import text_of
-from incpt.scene import mesh_part
 from incpt.scene.mesh import Mesh
+from incpt.scene.mesh_part import MeshPart
 from incpt.scene.shapes import shape
 
 
@@ -19,7 +19,7 @@ class MeshLibrary:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._parts: dict[str, tuple[mesh_part.MeshPart, ...]] = {}
+        self._parts: dict[str, tuple[MeshPart, ...]] = {}
 
     def meshes(self, table: Mapping[str, Any]) -> list[tuple[str | None, Mesh]]:
         """(part, mesh) that the keys `shape`, or `mesh` and `part`, of a table ask for. Raises InputError."""

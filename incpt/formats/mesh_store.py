@@ -19,8 +19,8 @@ from incpt.core.files import read_bytes, write_bytes
 from incpt.scene.mesh import Mesh, MeshSource
 from incpt.scene.mesh_part import MeshPart
 
-STORED_SUFFIX = "npz"
-"""Of meshes that `store_mesh` writes."""
+STORED_SUFFIX = ".npz"
+"""Ends the names of files that `store_mesh` writes."""
 
 
 def store_mesh(path: Path, mesh: Mesh) -> None:

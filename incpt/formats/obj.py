@@ -4,15 +4,6 @@ from __future__ import annotations
 
 import re
 
-from incpt.core.errors import one_line
-
-
-def hint(error: Exception) -> str:
-    """What an exception of a library says, in a few words for a message."""
-    text = one_line(error)[:120].rstrip(".")
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__
-
-
 ODD_FACE = re.compile(rb"^[ \t]*f[^\n\\]*[\s/](?:-|0+(?:[\s/]|$))", re.MULTILINE)
 """A face line with an index that is negative or zero."""
 _OBJ_ROWS = {b"v": 0, b"vt": 1, b"vn": 2}

@@ -1,18 +1,96 @@
-"""Which reader takes which file: `load` reads a scene from any file that holds one."""
+"""Which files can be read, and by what: one row for each suffix.
+
+To read another format, write its reader and add a row. Readers are named and not imported here, so that the
+libraries behind them (trimesh alone takes half a second) are loaded when the first file of their kind is
+read.
+"""
 
 from __future__ import annotations
 
 import os
 import warnings
+from dataclasses import dataclass
+from enum import Enum
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
-from incpt.core import files
-from incpt.core.errors import InputError, InputWarning
-from incpt.formats import mesh_files
-from incpt.formats.mesh_scene import scene_around
-from incpt.formats.scene_toml import load_scene_toml
+from incpt.core.errors import InputError, InputWarning, in_place
+from incpt.core.files import check_readable
 from incpt.scene.model import Scene
 from incpt.scene.summary import scene_problems
+
+
+class FileKind(Enum):
+    """What a file holds, and so what reading it gives: a Scene, a tuple of MeshPart, or an Image."""
+
+    SCENE = "scene"
+    MESH = "mesh"
+    IMAGE = "image"
+
+
+@dataclass(frozen=True)
+class Format:
+    """A row: files with `suffix` (lower case, with its dot) hold that `kind` of thing.
+
+    `reader` is the module in this folder and the function in it that takes the path of a readable file and
+    returns what the kind says; what it raises as InputError does not name the file, which `read` does.
+    `needs` are modules that the reader uses and an installation may lack. `is_whole`: the file alone decides
+    what is read, so that what was read stays valid while the file keeps its age and size.
+    """
+
+    suffix: str
+    kind: FileKind
+    reader: tuple[str, str]
+    needs: tuple[str, ...] = ()
+    is_whole: bool = True
+
+    @property
+    def is_available(self) -> bool:
+        """Whether everything that the reader needs is installed."""
+        return all(find_spec(name) is not None for name in self.needs)
+
+    def read(self, path: Path) -> Any:
+        """What the file holds, see FileKind. Raises InputError."""
+        module, function = self.reader
+        with in_place(str(path)):
+            return getattr(import_module(f"incpt.formats.{module}"), function)(path)
+
+
+OPENEXR = Format(".exr", FileKind.IMAGE, ("images", "read_exr"))
+_TRIMESH = ("trimesh_adapter", "read_with_trimesh")
+FORMATS = (
+    Format(".toml", FileKind.SCENE, ("scene_toml", "load_scene_toml"), is_whole=False),
+    OPENEXR,
+    Format(".glb", FileKind.MESH, _TRIMESH),
+    Format(".gltf", FileKind.MESH, _TRIMESH, is_whole=False),
+    Format(".obj", FileKind.MESH, _TRIMESH),
+    Format(".off", FileKind.MESH, _TRIMESH),
+    Format(".ply", FileKind.MESH, _TRIMESH),
+    Format(".stl", FileKind.MESH, _TRIMESH),
+    Format(".3mf", FileKind.MESH, _TRIMESH, needs=("lxml", "networkx")),
+    Format(".dae", FileKind.MESH, _TRIMESH, needs=("collada",)),
+    Format(".npz", FileKind.MESH, ("mesh_store", "read_stored")),
+)
+"""All formats, in the order in which messages list them."""
+
+
+def suffixes(kind: FileKind) -> tuple[str, ...]:
+    """Suffixes, with their dot, of the files of a kind that can be read here."""
+    return tuple(row.suffix for row in FORMATS if row.kind is kind and row.is_available)
+
+
+def listed(kind: FileKind) -> str:
+    """These suffixes as a list for a message."""
+    return ", ".join(suffixes(kind))
+
+
+def format_of(path: str | os.PathLike[str], *kinds: FileKind) -> Format | None:
+    """The format of a file by its suffix, if it is of one of these kinds and can be read here."""
+    suffix = Path(path).suffix.lower()
+    rows = (row for row in FORMATS if row.suffix == suffix and row.kind in kinds and row.is_available)
+    return next(rows, None)
 
 
 def load(path: str | os.PathLike[str]) -> Scene:
@@ -22,17 +100,20 @@ def load(path: str | os.PathLike[str]) -> Scene:
     one line that names file, table and key.
     """
     path = Path(path)
-    files.check_readable(path)
-    suffix = path.suffix[1:].lower()
-    if suffix == "toml":
-        scene = load_scene_toml(path)
-    elif suffix in mesh_files.mesh_suffixes():
-        scene = scene_around(path)
-    else:
+    check_readable(path)
+    row = format_of(path, FileKind.SCENE, FileKind.MESH)
+    if row is None:
         raise InputError(
-            f"{path}: files of this type cannot be read; use a scene (.toml) "
-            f"or a mesh ({mesh_files.readable_types()})"
+            f"{path}: files of this type cannot be read; use a scene ({listed(FileKind.SCENE)}) "
+            f"or a mesh ({listed(FileKind.MESH)})"
         )
+    if row.kind is FileKind.SCENE:
+        scene: Scene = row.read(path)
+    else:
+        # It reads meshes by the table above.
+        from incpt.formats.mesh_scene import scene_around
+
+        scene = scene_around(path)
     for problem in scene_problems(scene):
         warnings.warn(f"{path}: {problem}", InputWarning, stacklevel=2)
     return scene

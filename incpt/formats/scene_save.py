@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomlkit
-from tomlkit.exceptions import TOMLKitError
 
 from incpt.core import files
 from incpt.core.errors import InputError, InputWarning, one_line
@@ -75,7 +73,7 @@ class _Beside:
             part = {} if source.part is None else {"part": source.part}
             return {"mesh": self._relative(source.file), **part}
         label = re.sub(r"[^A-Za-z0-9]+", "-", name)[:40].strip("-") or "mesh"
-        path = self._folder / f"{self._stem}.{label}.{mesh_store.digest(mesh)}.{mesh_store.STORED_SUFFIX}"
+        path = self._folder / f"{self._stem}.{label}.{mesh_store.digest(mesh)}{mesh_store.STORED_SUFFIX}"
         if not path.exists():
             mesh_store.store_mesh(path, mesh)
             self._written.append(path)
@@ -124,6 +122,11 @@ def _same_mesh(a: Mesh, b: Mesh | None) -> bool:
 
 
 def _document(scene: Scene, beside: _Beside) -> str:
+    """The text of a scene file. Raises InputError for a scene that TOML cannot hold."""
+    # Imported here, because most programs that import incpt never save a scene.
+    import tomlkit
+    from tomlkit.exceptions import TOMLKitError
+
     document = tomlkit.document()
     document["version"] = VERSION
     document["camera"] = {name: _toml(getattr(scene.camera, name)) for name in CAMERA_KEYS}

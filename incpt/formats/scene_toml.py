@@ -34,20 +34,19 @@ _MATERIAL_KEYS = tuple(field.name for field in fields(Material))
 
 
 def load_scene_toml(path: Path) -> Scene:
-    """The scene of a TOML file. Raises InputError, one line that names file, table and key."""
+    """The scene of a TOML file. Raises InputError, one line that names table and key, but not the file."""
     tables = read_toml(path)
-    with in_place(str(path)):
-        _check_version(tables)
-        check_keys(tables, _TABLES, "table or key")
-        with in_place("[camera]"):
-            camera = _built(Camera, table_of(tables, "camera"), CAMERA_KEYS)
-        with in_place("[environment]"):
-            environment = _environment(table_of(tables, "environment"), path.parent)
-        with in_place("[render]"):
-            settings = _built(RenderSettings, table_of(tables, "render"), RenderSettings.names())
-        materials = _materials(table_of(tables, "materials"))
-        objects = _objects(tables.get("objects", []), materials, path.parent)
-        return Scene(camera, environment, materials, tuple(objects), settings)
+    _check_version(tables)
+    check_keys(tables, _TABLES, "table or key")
+    with in_place("[camera]"):
+        camera = _built(Camera, table_of(tables, "camera"), CAMERA_KEYS)
+    with in_place("[environment]"):
+        environment = _environment(table_of(tables, "environment"), path.parent)
+    with in_place("[render]"):
+        settings = _built(RenderSettings, table_of(tables, "render"), RenderSettings.names())
+    materials = _materials(table_of(tables, "materials"))
+    objects = _objects(tables.get("objects", []), materials, path.parent)
+    return Scene(camera, environment, materials, tuple(objects), settings)
 
 
 def _check_version(tables: Mapping[str, Any]) -> None:

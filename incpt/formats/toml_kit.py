@@ -10,21 +10,21 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from incpt.core import files
 from incpt.core.errors import InputError, one_line
+from incpt.core.files import read_bytes
 
 _LARGEST_INTEGER = 1 << 63
 """TOML promises 64 bits; Python would read any number of digits."""
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """The tables of a TOML file. Raises InputError with line and column."""
-    content = files.read_bytes(path)
+    """The tables of a TOML file. Raises InputError with line and column, but without the file's name."""
+    content = read_bytes(path)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise InputError(f"{path}: line {line}: is not UTF-8 text; save it as UTF-8") from None
+        raise InputError(f"line {line}: is not UTF-8 text; save it as UTF-8") from None
     try:
         table = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, ValueError) as error:
@@ -32,14 +32,14 @@ def read_toml(path: Path) -> dict[str, Any]:
         place = re.search(r" \(at line (\d+), column (\d+)\)$", message)
         at = f"line {place[1]}, column {place[2]}: " if place else ""
         reason = message[: place.start()] if place else message
-        raise InputError(one_line(f"{path}: {at}is no valid TOML ({reason})")) from None
+        raise InputError(one_line(f"{at}is no valid TOML ({reason})")) from None
     except RecursionError:
-        raise InputError(f"{path}: is no valid TOML (nested too deeply)") from None
-    _check_integers(path, table)
+        raise InputError("is no valid TOML (nested too deeply)") from None
+    _check_integers(table)
     return table
 
 
-def _check_integers(path: Path, table: dict[str, Any]) -> None:
+def _check_integers(table: dict[str, Any]) -> None:
     left: list[tuple[str, Any]] = list(table.items())
     while left:
         key, value = left.pop()
@@ -48,9 +48,7 @@ def _check_integers(path: Path, table: dict[str, Any]) -> None:
         elif isinstance(value, list):
             left += [(key, item) for item in value]
         elif isinstance(value, int) and not -_LARGEST_INTEGER <= value < _LARGEST_INTEGER:
-            raise InputError(
-                f"{path}: {one_line(key)}: a whole number of more than 64 bits; use a smaller one"
-            )
+            raise InputError(f"{one_line(key)}: a whole number of more than 64 bits; use a smaller one")
 
 
 def check_keys(table: Mapping[str, Any], known: Collection[str], what: str = "key") -> None:

@@ -25,19 +25,18 @@ import numpy as np
 import numpy.typing as npt
 import trimesh
 
-from incpt.core.errors import InputError, InputWarning
+from incpt.core.errors import InputError, InputWarning, reason_of
 from incpt.core.files import read_bytes
-from incpt.formats.clean import placed_mesh
+from incpt.formats.clean import usable_mesh
 from incpt.formats.gltf import gltf_header, gltf_materials
-from incpt.formats.obj import ODD_FACE, absolute_obj, hint, utf8
+from incpt.formats.obj import ODD_FACE, absolute_obj, utf8
 from incpt.scene.mesh import MeshSource
 from incpt.scene.mesh_part import MeshPart
 
-TRIMESH_SUFFIXES = ("glb", "gltf", "obj", "off", "ply", "stl", "3mf", "dae")
 
-
-def read_with_trimesh(path: Path, suffix: str) -> tuple[MeshPart, ...]:
+def read_with_trimesh(path: Path) -> tuple[MeshPart, ...]:
     """The parts of a mesh file that trimesh can read; see `mesh_files.load_parts`. Raises InputError."""
+    suffix = path.suffix[1:].lower()
     header: dict[str, Any] = {}
     if suffix in ("glb", "gltf"):
         header = gltf_header(path, suffix)
@@ -48,7 +47,9 @@ def read_with_trimesh(path: Path, suffix: str) -> tuple[MeshPart, ...]:
     parts = []
     for name, geometry_name, matrix in instances:
         geometry = loaded.geometry[geometry_name]
-        mesh = placed_mesh(geometry, matrix, counts, with_normals=suffix != "stl")
+        # STL has a normal for each face, of which trimesh makes normals at vertices.
+        normals = None if suffix == "stl" else _normals(geometry)
+        mesh = usable_mesh(*_placed(geometry, normals, matrix), counts)
         if mesh is not None:
             parts.append(MeshPart(name, mesh, *materials.get(geometry_name, (None, None))))
     left_out = ", ".join(
@@ -59,7 +60,7 @@ def read_with_trimesh(path: Path, suffix: str) -> tuple[MeshPart, ...]:
     if left_out:
         total = counts["in all"]
         lost = sum(counts.values()) - total
-        warnings.warn(f"{path}: left out {lost} of {total} faces: {left_out}", InputWarning, stacklevel=4)
+        warnings.warn(f"{path}: left out {lost} of {total} faces: {left_out}", InputWarning, stacklevel=5)
     single = len(instances) == 1
     source = MeshSource(file=os.path.abspath(path))
     return tuple(
@@ -70,6 +71,37 @@ def read_with_trimesh(path: Path, suffix: str) -> tuple[MeshPart, ...]:
         )
         for p in parts
     )
+
+
+def _normals(geometry: trimesh.Trimesh) -> npt.NDArray[np.float64] | None:
+    """(V, 3) normals at the vertices as the file has them, or None where it has none."""
+    # They stand in the cache only where the loader put them; the property makes them up.
+    if "vertex_normals" not in geometry._cache:
+        return None
+    normals = np.asarray(geometry.vertex_normals, np.float64)
+    return normals if normals.shape == np.shape(geometry.vertices) else None
+
+
+def _placed(
+    geometry: trimesh.Trimesh, normals: npt.NDArray[np.float64] | None, matrix: npt.NDArray[np.float64]
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64], npt.NDArray[np.float64] | None]:
+    """Vertices (V, 3), faces (F, 3) and normals (V, 3) in the space of the file, under a (4, 4) matrix that
+    places them there; faces are turned over where it mirrors. The arrays are not checked."""
+    vertices = np.asarray(geometry.vertices, np.float64)
+    faces = np.asarray(geometry.faces, np.int64)
+    if np.array_equal(matrix, np.eye(4)) or vertices.ndim != 2 or vertices.shape[1] != 3:
+        return vertices, faces, normals
+    with np.errstate(all="ignore"):
+        linear = matrix[:3, :3]
+        vertices = vertices @ linear.T + matrix[:3, 3]
+        if normals is not None:
+            # The cofactor matrix is det · inverse transpose, and exists for flat placements too.
+            x, y, z = linear.T
+            cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=1)
+            normals = normals @ cofactors.T * np.sign(np.linalg.det(linear))
+        if np.linalg.det(linear) < 0:
+            faces = faces[:, ::-1]
+    return vertices, faces, normals
 
 
 @contextmanager
@@ -105,7 +137,7 @@ def _load(path: Path, suffix: str, content: bytes | None = None) -> trimesh.Scen
             stream: Any = str(path) if content is None else io.BytesIO(content)
             loaded = trimesh.load_scene(stream, file_type=suffix, **options)
     except Exception as error:  # any type at all on a damaged file; see the module's docstring
-        raise InputError(f"is no {suffix.upper()} mesh, or a damaged one ({hint(error)})") from None
+        raise InputError(f"is no {suffix.upper()} mesh, or a damaged one ({reason_of(error)})") from None
     if any("placeholder zeros" in message for message in messages):
         raise InputError("is compressed in a way that cannot be decoded; export it uncompressed")
     return loaded
@@ -126,7 +158,7 @@ def _load_obj(path: Path) -> tuple[trimesh.Scene, int]:
     try:
         content, left_out = absolute_obj(content)
     except ValueError as error:
-        raise InputError(f"is no OBJ mesh, or a damaged one ({hint(error)})") from None
+        raise InputError(f"is no OBJ mesh, or a damaged one ({reason_of(error)})") from None
     return _load(path, "obj", content), left_out
 
 

@@ -15,7 +15,7 @@ from incpt.core import transform
 from incpt.core.errors import InputError
 from incpt.formats import insert
 from incpt.formats.images import write_exr
-from incpt.formats.insert import FileKind
+from incpt.formats.registry import FileKind
 from incpt.scene import edits
 from incpt.scene.camera import Camera
 from incpt.scene.change import diff
@@ -106,7 +106,7 @@ GLTF = (
 
 
 def test_dropped_files_are_told_apart_by_their_suffix(tmp_path: Path) -> None:
-    kinds = {"a.TOML": FileKind.SCENE, "b.exr": FileKind.ENVIRONMENT, "c.PLY": FileKind.MESH}
+    kinds = {"a.TOML": FileKind.SCENE, "b.exr": FileKind.IMAGE, "c.PLY": FileKind.MESH}
     assert {name: insert.file_kind(name) for name in kinds} == kinds
     with pytest.raises(InputError, match="cannot be used"):
         insert.drop_file(SCENE, tmp_path / "a.docx")

@@ -7,9 +7,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from incpt.formats import insert, mesh_files
+from incpt.formats import insert, registry
+from incpt.formats.registry import FileKind
 from incpt.scene.selection import Selection
-from incpt.ui.dialogs.native import FileKind
+from incpt.ui.dialogs.native import FileFilter
 from incpt.ui.dialogs.path_dialog import PathDialog
 from incpt.ui.dialogs.question import Choice, Question
 from incpt.ui.editor.dialog import Answer
@@ -17,11 +18,11 @@ from incpt.ui.editor.document import Document, collected_warnings
 from incpt.ui.editor.editor import Editor
 from incpt.ui.editor.recovery import Recovery, find_left_behind
 
-SCENE_FILES = FileKind("Scenes", insert.SCENE_SUFFIXES)
+SCENE_FILES = FileFilter("Scenes", registry.suffixes(FileKind.SCENE))
 """Files that hold a whole scene."""
-MESH_FILES = FileKind("Meshes", tuple(f".{name}" for name in mesh_files.mesh_suffixes()))
+MESH_FILES = FileFilter("Meshes", registry.suffixes(FileKind.MESH))
 """Files that hold a mesh."""
-ENVIRONMENTS = FileKind("Environments", insert.ENVIRONMENT_SUFFIXES)
+ENVIRONMENTS = FileFilter("Environments", registry.suffixes(FileKind.IMAGE))
 """Images that may surround the scene."""
 
 
@@ -32,7 +33,7 @@ def new(editor: Editor) -> None:
 
 def open_(editor: Editor) -> None:
     """Ask for a scene file or a mesh and open it."""
-    everything = FileKind("Scenes and meshes", SCENE_FILES.suffixes + MESH_FILES.suffixes)
+    everything = FileFilter("Scenes and meshes", SCENE_FILES.suffixes + MESH_FILES.suffixes)
     _when_saved(
         editor, lambda: ask_path(editor, "Open", everything, False, lambda path: _open_now(editor, path))
     )
@@ -85,7 +86,7 @@ def choose_environment(editor: Editor) -> None:
 
 def drop(editor: Editor, path: Path) -> None:
     """Take a file that was dropped on the window: open a scene, add a mesh, use an environment image."""
-    if insert.file_kind(path) is insert.FileKind.SCENE:
+    if insert.file_kind(path) is FileKind.SCENE:
         open_file(editor, path)
         return
     with collected_warnings() as warnings:
@@ -124,7 +125,7 @@ def offer_recovery(editor: Editor, kept: Recovery) -> None:
 def ask_path(
     editor: Editor,
     title: str,
-    kind: FileKind,
+    kind: FileFilter,
     is_saving: bool,
     then: Callable[[Path], None],
     name: str = "",

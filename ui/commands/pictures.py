@@ -7,12 +7,12 @@ from pathlib import Path
 from incpt.core.errors import InputError
 from incpt.picture import tone_mapping
 from incpt.ui.commands.files import ask_path, stem
-from incpt.ui.dialogs.native import FileKind
+from incpt.ui.dialogs.native import FileFilter
 from incpt.ui.editor import clipboard
 from incpt.ui.editor.editor import Editor
 from incpt.viewer.renderer import Export
 
-PICTURES = FileKind("Pictures", (".png", ".exr"))
+PICTURES = FileFilter("Pictures", (".png", ".exr"))
 """Files that the picture can be written to."""
 
 

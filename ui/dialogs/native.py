@@ -13,7 +13,7 @@ _PROGRAMS = ("zenity", "kdialog", "matedialog", "qarma")
 """Programs that show the dialog on Linux."""
 
 
-class FileKind(NamedTuple):
+class FileFilter(NamedTuple):
     """Files that a dialog asks for: what they are called, and the suffixes that they have, with their dot."""
 
     name: str
@@ -29,7 +29,7 @@ def is_there() -> bool:
 class NativeDialog:
     """The system's dialog, from the moment when it is made until it is answered."""
 
-    def __init__(self, title: str, kind: FileKind, is_saving: bool, folder: Path) -> None:
+    def __init__(self, title: str, kind: FileFilter, is_saving: bool, folder: Path) -> None:
         filters = [kind.name, " ".join(f"*{suffix}" for suffix in kind.suffixes)]
         ask = portable_file_dialogs.save_file if is_saving else portable_file_dialogs.open_file
         self._asked = ask(title, f"{folder}/", filters)

@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 
 from incpt.core.errors import InputError
 from incpt.ui.dialogs import modal, native
-from incpt.ui.dialogs.native import FileKind, NativeDialog
+from incpt.ui.dialogs.native import FileFilter, NativeDialog
 from incpt.ui.dialogs.question import Choice, Question
 from incpt.ui.editor.dialog import Answer, Dialog
 from incpt.ui.editor.document import absolute_path
@@ -27,7 +27,7 @@ class PathDialog:
     def __init__(
         self,
         title: str,
-        kind: FileKind,
+        kind: FileFilter,
         is_saving: bool,
         folder: Path,
         then: Callable[[Path], None],
