@@ -13,7 +13,7 @@ from functools import cache, partial
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core.transform import Vector
+from incpt.core.affine import Vector
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
 from incpt.scene.material import Material

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
-from incpt.core import layout, transform
+from incpt.core import affine, layout
 from incpt.device.device import Device
 from incpt.render.wavefront import block_arguments, traces_in_blocks
 from incpt.scene.camera import Camera
@@ -136,7 +136,7 @@ class EmbreeTracer:
         from embreex.rtcore_scene import EmbreeScene
 
         corners = [
-            transform.apply_affine(obj.world_from_object, obj.mesh.vertices)[obj.mesh.faces]
+            affine.apply(obj.world_from_object, obj.mesh.vertices)[obj.mesh.faces]
             for obj in scene.objects
             if obj.visible
         ]
@@ -195,9 +195,7 @@ def camera_rays(camera: Camera, size: tuple[int, int], in_squares: bool = False)
     """Through the pixels' centres, tile by tile of 16 x 16, and in each row by row or in squares, as
     cl/tile.cl does it: coherent."""
     width, height = size
-    right, up, forward = transform.camera_frame(
-        camera.position, camera.target, camera.up, camera.fov_y, width / height
-    )
+    right, up, forward = camera.image_plane(width / height)
     y, x = (places.ravel() for places in np.mgrid[0:height, 0:width])
     edge = 4 if in_squares else 1
     order = np.lexsort((x % edge, y % edge, x // edge, y // edge, x // 16, y // 16))
@@ -241,7 +239,7 @@ def _hit_points(
 def _lamp_points(scene: Scene, count: int, generator: np.random.Generator) -> npt.NDArray[np.float64]:
     corners = np.concatenate(
         [
-            transform.apply_affine(obj.world_from_object, obj.mesh.vertices)[obj.mesh.faces]
+            affine.apply(obj.world_from_object, obj.mesh.vertices)[obj.mesh.faces]
             for obj in scene.objects
             if scene.materials[obj.material].is_emissive
         ]

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from incpt.benchmarks.peers.peer import FloatImage, Job, MissingPeer
+from incpt.core.affine import Vector
 from incpt.core.layout import MIN_ALPHA
-from incpt.core.transform import Vector
 from incpt.formats.images import load_image
 from incpt.scene.camera import Camera
 from incpt.scene.material import Material

@@ -6,8 +6,8 @@ import time
 from dataclasses import replace
 
 from incpt.benchmarks.peers.peer import FloatImage, Job
+from incpt.core.affine import Vector
 from incpt.core.settings import RenderSettings
-from incpt.core.transform import Vector
 from incpt.device.device import Device
 from incpt.render.session import Session
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from incpt.benchmarks.peers.peer import FloatImage, Job, MissingPeer
-from incpt.core.transform import Vector
+from incpt.core.affine import Vector
 
 # Mitsuba counts segments of a path: one to the first hit, one to the light.
 _SEGMENTS_BESIDE_BOUNCES = 2

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core.transform import Vector
+from incpt.core.affine import Vector
 from incpt.scene.model import Scene
 
 FloatImage = npt.NDArray[np.float32]

@@ -11,8 +11,8 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from incpt.benchmarks.peers.peer import FloatImage, Job, MissingPeer, make
+from incpt.core.affine import Vector
 from incpt.core.errors import one_line
-from incpt.core.transform import Vector
 from incpt.device.device import DEVICE_VARIABLE
 
 _START_S = 300.0

@@ -6,8 +6,8 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
+from incpt.core.affine import Vector
 from incpt.core.errors import InputError
-from incpt.core.transform import Vector
 from incpt.formats import images, mesh_files, registry
 from incpt.formats.registry import FileKind
 from incpt.scene import edits

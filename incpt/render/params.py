@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core import layout, transform
+from incpt.core import layout
 from incpt.core.settings import RenderSettings
 from incpt.tables.scene_tables import SceneTables
 
@@ -19,9 +19,7 @@ def launch_params(
     scene = tables.scene
     camera, environment = scene.camera, scene.environment
     params = np.zeros((), layout.PARAMS)
-    right, up, forward = transform.camera_frame(
-        camera.position, camera.target, camera.up, camera.fov_y, width / height
-    )
+    right, up, forward = camera.image_plane(width / height)
     params["camera"] = (camera.position, right, up, forward)
     params["width"], params["height"] = width, height
     params["in_squares"] = tables.has_trees

@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
-from incpt.core import transform
+from incpt.core import affine
 from incpt.core.settings import RenderSettings
 from incpt.render import tiles
 from incpt.render.film import RADIANCE, Film, FilmPass, Float32Array
@@ -196,9 +196,9 @@ def point_of_change(
     picture of that size; the centre of the picture where there are none in front of the camera."""
     if not objects:
         return width / 2, height / 2
-    frame = transform.camera_frame(camera.position, camera.target, camera.up, camera.fov_y, width / height)
-    corners = np.concatenate([transform.box_corners(obj.world_bounds) for obj in objects])
-    pixels, in_front = transform.project(corners, camera.position, frame, (width, height))
+    corners = np.concatenate([affine.box_corners(obj.world_bounds) for obj in objects])
+    pixels, in_front = camera.project(corners, width / height)
+    pixels = pixels * (width, height)
     if not in_front.any():
         return width / 2, height / 2
     low, high = pixels[in_front].min(axis=0), pixels[in_front].max(axis=0)

@@ -14,9 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core import transform
+from incpt.core import affine
+from incpt.core.affine import Vector
 from incpt.core.errors import InputError
-from incpt.core.transform import Vector
 from incpt.scene.camera import Camera
 
 Array = npt.NDArray[np.float64]
@@ -68,7 +68,7 @@ def look(camera: Camera, dx: float, dy: float, height: float) -> Camera:
 
 def pan(camera: Camera, dx: float, dy: float, height: float) -> Camera:
     """Moved sideways so that what lies at the target's distance follows the cursor by (dx, dy) pixels."""
-    right, up, _ = _axes(camera, 1.0)
+    right, up, _ = camera.image_plane(1.0)
     move = (dy * up - dx * right) * (2 * _distance(camera) / height)
     return _moved(camera, move)
 
@@ -81,7 +81,7 @@ def zoom(camera: Camera, factor: float, cursor: tuple[float, float], size: tuple
     new_distance = max(distance * factor, min(nearest, distance))
     ray = _ray(camera, cursor, size)
     position = np.asarray(camera.position) + ray * (distance - new_distance)
-    return _with(camera, position, position + _axes(camera, 1.0)[2] * new_distance)
+    return _with(camera, position, position + camera.image_plane(1.0)[2] * new_distance)
 
 
 def wheel(camera: Camera, notches: float, cursor: tuple[float, float], size: tuple[float, float]) -> Camera:
@@ -97,7 +97,7 @@ def dolly(camera: Camera, dx: float, dy: float, height: float) -> Camera:
 def fly(camera: Camera, forward: float, right: float, up: float, seconds: float, speed: float) -> Camera:
     """Moved as a free camera: `forward` and `right` along the view, `up` along the camera's up, each from
     -1 to 1, at `speed` metres per second; diagonals are not faster."""
-    right_axis, _, forward_axis = _axes(camera, 1.0)
+    right_axis, _, forward_axis = camera.image_plane(1.0)
     direction = forward * forward_axis + right * _unit(right_axis) + up * _up(camera)
     length = float(np.linalg.norm(direction))
     return _moved(camera, direction / max(length, 1.0) * (seconds * speed))
@@ -110,8 +110,8 @@ def frame(camera: Camera, bounds: npt.ArrayLike, aspect: float) -> Camera:
     middle = box.mean(axis=0)
     if np.ptp(box, axis=0).max() < NEAREST:  # a point: any distance shows it
         box = np.stack([middle - NEAREST / 2, middle + NEAREST / 2])
-    right, up, forward = _axes(camera, aspect)
-    offset = transform.box_corners(box) - middle
+    right, up, forward = camera.image_plane(aspect)
+    offset = affine.box_corners(box) - middle
     x = np.abs(offset @ right) / (right @ right)
     y = np.abs(offset @ up) / (up @ up)
     depth = offset @ forward
@@ -140,13 +140,9 @@ def point_under(camera: Camera, cursor: tuple[float, float], size: tuple[float, 
     return _vector(point)
 
 
-def _axes(camera: Camera, aspect: float) -> tuple[Array, Array, Array]:
-    return transform.camera_frame(camera.position, camera.target, camera.up, camera.fov_y, aspect)
-
-
 def _ray(camera: Camera, cursor: tuple[float, float], size: tuple[float, float]) -> Array:
     """Direction through a pixel, 1 long along the view."""
-    right, up, forward = _axes(camera, size[0] / size[1])
+    right, up, forward = camera.image_plane(size[0] / size[1])
     ray: Array = forward + right * (2 * cursor[0] / size[0] - 1) + up * (1 - 2 * cursor[1] / size[1])
     return ray
 
@@ -170,7 +166,7 @@ def _turned(camera: Camera, back: Array, azimuth_deg: float, elevation_deg: floa
     """A unit direction turned about the camera's up, right-handed, and away from the horizon."""
     up = _up(camera)
     # The picture's right is level whatever the elevation, and defined where the view is along `up`.
-    side = _unit(_axes(camera, 1.0)[0])
+    side = _unit(camera.image_plane(1.0)[0])
     level = np.cross(side, up)
     old = math.degrees(math.atan2(float(back @ up), float(back @ level)))
     elevation = min(max(old + elevation_deg, -MAX_ELEVATION_DEG), MAX_ELEVATION_DEG)

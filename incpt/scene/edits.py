@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core import transform
+from incpt.core import affine
+from incpt.core.affine import Vector
 from incpt.core.errors import InputError
-from incpt.core.transform import Vector
 from incpt.scene.checks import LARGEST
 from incpt.scene.material import Material
 from incpt.scene.mesh_part import MeshPart
@@ -147,7 +147,7 @@ def transform_objects(
     Give the scene from before the drag and the whole movement since then, so that rounding does not add up.
     Rotations stay near what they were and scales keep their signs; what is not turned keeps its angles and
     what is not scaled its scale, to the bit. Shear, which a scaled group of turned objects would get, is
-    dropped (`transform.decompose`), but where an object has a matrix, which then is just multiplied. Numbers
+    dropped (`affine.decompose`), but where an object has a matrix, which then is just multiplied. Numbers
     out of the scene's range are brought back into it, and an object that would be flattened stays as it was.
     Raises InputError for unknown names.
     """
@@ -273,7 +273,7 @@ def _without_shear(
     if np.abs(turn - np.eye(3)).max() < _RIGID:
         return replace(old, position=position)
     try:
-        _, rotation, scale = transform.decompose(world, old.rotation, old.scale)
+        _, rotation, scale = affine.decompose(world, old.rotation, old.scale)
     except np.linalg.LinAlgError:
         return old
     is_turned_only = np.abs(turn @ turn.T - np.eye(3)).max() < _RIGID and np.linalg.det(turn) > 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from incpt.core.transform import Vector
+from incpt.core.affine import Vector
 from incpt.scene.checks import LARGEST, set_number, set_vector
 from incpt.scene.image import Image
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from incpt.core.affine import Vector
 from incpt.core.errors import InputError
-from incpt.core.transform import Vector
 from incpt.scene.checks import set_number, set_vector
 
 

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core import transform
+from incpt.core import affine
+from incpt.core.affine import Vector
 from incpt.core.errors import InputError
 from incpt.core.layout import MEDIUM_NONE
 from incpt.core.settings import RenderSettings
-from incpt.core.transform import Vector
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
 from incpt.scene.material import Material
@@ -98,7 +98,7 @@ class Object:
     @cached_property
     def world_bounds(self) -> npt.NDArray[np.float64]:
         """(2, 3) bounds of the corners of the mesh's box, in world space."""
-        corners = transform.apply_affine(self.world_from_object, transform.box_corners(self.mesh.bounds))
+        corners = affine.apply(self.world_from_object, affine.box_corners(self.mesh.bounds))
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
 

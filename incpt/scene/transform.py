@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core import transform
+from incpt.core import affine
+from incpt.core.affine import Vector
 from incpt.core.errors import InputError
-from incpt.core.transform import Vector
 from incpt.scene.checks import LARGEST, checked_number, set_vector
 
 Row = tuple[float, float, float, float]
@@ -39,7 +39,7 @@ class Transform:
 
     With a matrix, the three rows of an affine one, the matrix alone says where the object is. The other
     fields are then read off it, for whoever shows or edits numbers: the position exactly; the rotation
-    nearest to the directions of the axes; the scale along the rotated axes (see `core.transform.decompose`).
+    nearest to the directions of the axes; the scale along the rotated axes (see `core.affine.decompose`).
     Of the angles and signs that describe the same matrix, those nearest to the `rotation` and the signs of
     the `scale` that stand beside it are taken, so that numbers do not jump while they are edited. A
     comparison of two placements by a matrix does not count them.
@@ -57,7 +57,7 @@ class Transform:
             set_vector(self, name)
         if self.matrix is not None:
             rows = _checked_rows(self.matrix)
-            parts = transform.decompose(np.array(rows), self.rotation, self.scale)
+            parts = affine.decompose(np.array(rows), self.rotation, self.scale)
             for name, value in zip(("position", "rotation", "scale", "matrix"), (*parts, rows), strict=True):
                 object.__setattr__(self, name, value)
         elif min(abs(s) for s in self.scale) < SMALLEST_SCALE:
@@ -75,7 +75,7 @@ class Transform:
         """(3, 4) affine matrix."""
         if self.matrix is not None:
             return np.array(self.matrix)
-        return transform.world_from_object(self.position, self.rotation, self.scale)
+        return affine.compose(self.position, self.rotation, self.scale)
 
     def with_parts(
         self,
@@ -110,7 +110,7 @@ class Transform:
         if scale is not None:
             world[:, :3] *= np.divide(wanted.scale, self.scale)
         if rotation is not None:
-            turn = transform.rotation_matrix(wanted.rotation) @ transform.rotation_matrix(self.rotation).T
+            turn = affine.rotation_matrix(wanted.rotation) @ affine.rotation_matrix(self.rotation).T
             world[:, :3] = turn @ world[:, :3]
         return Transform(
             rotation=wanted.rotation if rotation is not None else self.rotation,

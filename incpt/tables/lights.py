@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
-from incpt.core import layout, transform
+from incpt.core import affine, layout
 from incpt.device.device import Device
 from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
@@ -78,7 +78,7 @@ def triangle_lights(scene: Scene, share: float) -> TriangleLights:
         # A mirrored face keeps its outside: two corners change places to keep it on the normal's side.
         mirrored = np.linalg.det(obj.world_from_object[:, :3]) < 0
         faces = obj.mesh.faces[:, [0, 2, 1]] if mirrored else obj.mesh.faces
-        corners.append(transform.apply_affine(obj.world_from_object, obj.mesh.vertices)[faces])
+        corners.append(affine.apply(obj.world_from_object, obj.mesh.vertices)[faces])
         emission.append(np.broadcast_to(material.emission, (len(faces), 3)))
         weights.append(np.full(len(faces), radiant_weight(material)))
         double_sided.append(np.full(len(faces), material.double_sided))

@@ -16,7 +16,7 @@ import numpy.typing as npt
 import pyopencl as cl
 
 from incpt.accel import bvh
-from incpt.core import layout, transform
+from incpt.core import affine, layout
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
 from incpt.tables.geometry_pool import GeometryPool, PooledMesh
@@ -154,7 +154,7 @@ def _describe(obj: Object, world_vertices: npt.NDArray[np.float32] | None, row: 
     """Fill in what depends on the object alone. `world_vertices` (V, 3) are given where its triangles are
     part of the top level."""
     matrix = obj.world_from_object
-    inverse = transform.invert_affine(matrix)
+    inverse = affine.invert(matrix)
     row["world_from_object"], row["object_from_world"] = matrix.ravel(), inverse.ravel()
     if world_vertices is not None:
         bounds = np.stack([world_vertices.min(axis=0), world_vertices.max(axis=0)])
@@ -167,7 +167,7 @@ def _describe(obj: Object, world_vertices: npt.NDArray[np.float32] | None, row: 
 
 def _world_vertices(obj: Object) -> npt.NDArray[np.float32]:
     vertices = obj.mesh.vertices.astype(np.float64)
-    return transform.apply_affine(obj.world_from_object, vertices).astype(np.float32)
+    return affine.apply(obj.world_from_object, vertices).astype(np.float32)
 
 
 def _objects_in_world_space(sizes: npt.NDArray[np.int64]) -> list[int]:

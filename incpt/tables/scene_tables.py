@@ -16,7 +16,7 @@ from weakref import WeakKeyDictionary, WeakValueDictionary
 
 import pyopencl as cl
 
-from incpt.core.transform import Vector
+from incpt.core.affine import Vector
 from incpt.scene.change import Change, diff
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Scene

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from incpt.accel import bvh, top_level
-from incpt.core import layout, transform
+from incpt.core import affine, layout
 from incpt.core.errors import InputError
 from incpt.core.layout import HitPlane, PathClass, PathPlane, RayPlane, ShadowPlane
 from incpt.device.device import Device
@@ -71,7 +71,7 @@ class World:
         for record, obj in zip(records, self.objects, strict=False):
             matrix = obj.world_from_object
             record["world_from_object"] = matrix.ravel()
-            inverse = transform.invert_affine(matrix)
+            inverse = affine.invert(matrix)
             record["object_from_world"] = inverse.ravel()
             record["position_error"] = bvh.position_error(obj.mesh.bounds, matrix, inverse)
             record["first_node"], record["first_pack"], record["first_normal"] = first[id(obj.mesh)]
@@ -126,7 +126,7 @@ class World:
 
 def brute_force(obj: model.Object, origins: Floats, directions: Floats) -> npt.NDArray[np.float64]:
     """(N, F) distances to every face in float64 (Moeller and Trumbore), infinite where it is missed."""
-    world = transform.apply_affine(obj.world_from_object, obj.mesh.vertices.astype(np.float64))
+    world = affine.apply(obj.world_from_object, obj.mesh.vertices.astype(np.float64))
     a, b, c = world[obj.mesh.faces].transpose(1, 0, 2)
     o, d = origins.astype(np.float64)[:, None], directions.astype(np.float64)[:, None]
     with np.errstate(all="ignore"):
@@ -462,9 +462,9 @@ def test_closed_meshes_are_watertight(device: Device, placement: dict[str, objec
     a, b, _ = mesh.vertices[mesh.faces].astype(np.float64).transpose(1, 0, 2)
     weight = rng.random((4, len(a), 1))
     edges = (a + (b - a) * weight).reshape(-1, 3)
-    targets = transform.apply_affine(matrix, np.concatenate([edges, mesh.vertices, mesh.vertices]))
-    inside = transform.apply_affine(matrix, rng.normal(size=(len(targets), 3)) * 0.08)
-    inside[-len(mesh.vertices) :] = transform.apply_affine(matrix, np.zeros((1, 3)))
+    targets = affine.apply(matrix, np.concatenate([edges, mesh.vertices, mesh.vertices]))
+    inside = affine.apply(matrix, rng.normal(size=(len(targets), 3)) * 0.08)
+    inside[-len(mesh.vertices) :] = affine.apply(matrix, np.zeros((1, 3)))
     origins = inside.astype(np.float32)
     directions = directions_to(targets, origins)
     world = World(device, [obj])
@@ -572,7 +572,7 @@ def test_rays_from_a_surface_never_meet_it_again(
         mesh.vertices[mesh.faces[rng.integers(len(mesh.faces), size=20000)]].astype(float).transpose(1, 0, 2)
     )
     u, v = rng.random((2, 20000, 1))
-    targets = transform.apply_affine(obj.world_from_object, a + np.sqrt(u) * ((b - a) + v * (c - b)))
+    targets = affine.apply(obj.world_from_object, a + np.sqrt(u) * ((b - a) + v * (c - b)))
     origins = (targets + rng.normal(size=targets.shape) * rng.choice([0.1, 1, 30], (20000, 1))).astype("f4")
     hits = world.intersect(origins, directions_to(targets, origins))
     position = hits.floats(HitPlane.POSITION_X, 3)[hits.hit]

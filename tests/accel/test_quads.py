@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from incpt.accel import clusters, quads
 from incpt.benchmarks.kit.scenes import crowd, icosphere
-from incpt.core import layout, transform
+from incpt.core import affine, layout
 from incpt.core.layout import HitPlane
 from incpt.device.device import Device
 from incpt.render.wavefront import block_arguments, traces_in_blocks
@@ -414,7 +414,7 @@ def test_no_ray_slips_through_the_seams_of_parallelograms(device: Device) -> Non
     box = scene.objects[0]
     rng = np.random.default_rng(7)
     vertices = box.mesh.vertices.astype(np.float64)
-    world = transform.apply_affine(box.world_from_object, vertices).astype(np.float32)
+    world = affine.apply(box.world_from_object, vertices).astype(np.float32)
     faces = rng.integers(0, len(box.mesh.faces), 20000)
     side = rng.integers(0, 3, 20000)
     ends = world[box.mesh.faces[faces, side]], world[box.mesh.faces[faces, (side + 1) % 3]]
@@ -467,7 +467,7 @@ def test_rays_from_a_side_never_meet_it_again(device: Device, name: str, placeme
     local = rng.uniform(-0.5, 0.5, (20000, 3))
     if name == "plane":
         local[:, 1] = 0
-    targets = transform.apply_affine(matrix, local)
+    targets = affine.apply(matrix, local)
     origins = targets + rng.normal(size=targets.shape) * rng.choice([0.1, 1, 30], (20000, 1))
 
     def met(starts: npt.NDArray[Any], directions: npt.NDArray[Any]) -> Floats:

@@ -20,8 +20,8 @@ from incpt.benchmarks.peers import compare
 from incpt.benchmarks.peers.mitsuba_peer import MOST_LANES, passes
 from incpt.benchmarks.peers.peer import PEERS, FloatImage, Job, MissingPeer
 from incpt.benchmarks.peers.worker import Worker
+from incpt.core.affine import Vector
 from incpt.core.settings import RenderSettings
-from incpt.core.transform import Vector
 from incpt.device.device import Device
 from incpt.render.session import Session
 

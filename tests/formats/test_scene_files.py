@@ -15,7 +15,7 @@ import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from incpt.core import transform
+from incpt.core import affine
 from incpt.core.errors import InputError, InputWarning, OutputError
 from incpt.core.settings import RenderSettings
 from incpt.formats import images, mesh_files, mesh_store, registry, scene_save
@@ -165,10 +165,10 @@ def test_a_mesh_file_makes_a_scene(tmp_path: Path) -> None:
     assert [o.name for o in scene.objects] == ["bunny"]
     assert any(scene.environment.radiance)
     # The camera sees all of it: every corner of the bounds lies within the field of view.
-    corners = transform.box_corners(scene.objects[0].world_bounds)
+    corners = affine.box_corners(scene.objects[0].world_bounds)
     camera = scene.camera
-    frame = transform.camera_frame(camera.position, camera.target, camera.up, camera.fov_y, 1.0)
-    pixels, in_front = transform.project(corners, camera.position, frame, (100, 100))
+    pixels, in_front = camera.project(corners, 1.0)
+    pixels = pixels * (100, 100)
     assert in_front.all() and (pixels > 0).all() and (pixels < 100).all()
     two_boxes(tmp_path / "two.glb")
     assert [o.name for o in registry.load(tmp_path / "two.glb").objects] == ["two/left", "two/right"]

@@ -11,7 +11,7 @@ import pytest
 from support.kernels import direction
 from support.renders import assert_same_mean, blocks, render, repeat
 
-from incpt.core.transform import Vector
+from incpt.core.affine import Vector
 from incpt.device import program
 from incpt.device.device import Device
 from incpt.scene.camera import Camera

@@ -11,7 +11,7 @@ from support.kernels import device
 from support.renders import render
 from support.small_scenes import mixed_scene
 
-from incpt.core import transform
+from incpt.core import affine
 from incpt.core.settings import RenderSettings
 from incpt.render.session import Session
 from incpt.scene.mesh import Mesh
@@ -47,7 +47,7 @@ def baked(obj: Object) -> Object:
     if np.linalg.det(linear) < 0:
         faces = faces[:, ::-1]
         normals = None if normals is None else normals[:, ::-1]
-    vertices = transform.apply_affine(obj.world_from_object, mesh.vertices).astype(np.float32)
+    vertices = affine.apply(obj.world_from_object, mesh.vertices).astype(np.float32)
     return Object(obj.name, Mesh(vertices, faces, normals), obj.material)
 
 

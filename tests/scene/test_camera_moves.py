@@ -10,8 +10,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from incpt.core import transform
-from incpt.core.transform import Vector
+from incpt.core import affine
+from incpt.core.affine import Vector
 from incpt.scene import camera_moves
 from incpt.scene.camera import Camera
 from incpt.scene.camera_moves import MAX_ELEVATION_DEG, VIEWS
@@ -40,8 +40,8 @@ def cameras(draw: st.DrawFn, tilted: bool = True) -> Camera:
 
 def pixel_of(camera: Camera, point: Vector) -> np.ndarray:
     aspect = SIZE[0] / SIZE[1]
-    frame = transform.camera_frame(camera.position, camera.target, camera.up, camera.fov_y, aspect)
-    found, in_front = transform.project(np.array([point]), camera.position, frame, SIZE)
+    found, in_front = camera.project(np.array([point]), aspect)
+    found = found * SIZE
     assert in_front.all()
     return found[0]
 
@@ -123,8 +123,8 @@ def test_the_view_never_flips_over_the_pole() -> None:
     camera = Camera((0, 1, 5), (0, 0, 0))
     for _ in range(50):
         turned = camera_moves.orbit(camera, 3, 30, HEIGHT)
-        right_before = transform.camera_frame(camera.position, camera.target, camera.up, 40, 1)[0]
-        right_after = transform.camera_frame(turned.position, turned.target, turned.up, 40, 1)[0]
+        right_before = camera.image_plane(1)[0]
+        right_after = turned.image_plane(1)[0]
         assert right_before @ right_after > 0.9 * (right_before @ right_before)
         camera = turned
     assert elevation(camera) == pytest.approx(MAX_ELEVATION_DEG)
@@ -177,14 +177,13 @@ def test_frame_shows_all_of_a_box_with_margin(
 ) -> None:
     box = np.array([low, np.add(low, extent)])
     framed = camera_moves.frame(camera, box, aspect)
-    frame = transform.camera_frame(framed.position, framed.target, framed.up, framed.fov_y, aspect)
-    size = (1000 * aspect, 1000)
-    found, in_front = transform.project(transform.box_corners(box), framed.position, frame, size)  # type: ignore[arg-type]
+    forward = framed.image_plane(aspect)[2]
+    found, in_front = framed.project(affine.box_corners(box), aspect)
     assert in_front.all()
-    normalized = np.abs(found / size * 2 - 1).max()
+    normalized = np.abs(found * 2 - 1).max()
     assert normalized <= 1 / camera_moves.FRAME_MARGIN + 1e-3
     if max(extent) > 0.01:
-        nearest = ((transform.box_corners(box) - framed.position) @ frame[2]).min()
+        nearest = ((affine.box_corners(box) - framed.position) @ forward).min()
         is_close = nearest == pytest.approx(camera_moves.FRAME_CLEARANCE * math.hypot(*extent), rel=1e-3)
         assert is_close or normalized == pytest.approx(1 / camera_moves.FRAME_MARGIN, abs=1e-3)
         assert framed.target == pytest.approx(box.mean(axis=0))
@@ -197,7 +196,7 @@ def test_views_look_along_their_axis(side: str) -> None:
     back = np.subtract(seen.position, seen.target) / distance(seen)
     assert back == pytest.approx(VIEWS[side], abs=0.002)
     assert seen.target == camera.target and distance(seen) == pytest.approx(distance(camera))
-    right, up, _ = transform.camera_frame(seen.position, seen.target, seen.up, 40, 1)
+    right, up, _ = seen.image_plane(1)
     expected = {"front": "+x", "back": "-x", "right": "-z", "left": "+z", "top": "+x", "bottom": "+x"}[side]
     axis = "xyz".index(expected[1])
     assert right[axis] * (1 if expected[0] == "+" else -1) == pytest.approx(np.linalg.norm(right))

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from incpt.core import transform
+from incpt.core import affine
 from incpt.core.errors import InputError
 from incpt.formats import insert
 from incpt.formats.images import write_exr
@@ -183,12 +183,12 @@ def test_bounds_of_what_is_named_or_of_all_that_is_shown() -> None:
     assert edits.bounds_of(Scene()) is None
 
 
-def affine(
+def matrix_of(
     position: tuple[float, float, float] = (0, 0, 0),
     rotation: tuple[float, float, float] = (0, 0, 0),
     scale: tuple[float, float, float] = (1, 1, 1),
 ) -> npt.NDArray[np.float64]:
-    return np.vstack([transform.world_from_object(position, rotation, scale), [0, 0, 0, 1]])
+    return np.vstack([affine.compose(position, rotation, scale), [0, 0, 0, 1]])
 
 
 vectors = st.tuples(*[st.floats(-5, 5)] * 3)
@@ -204,38 +204,38 @@ def test_a_group_keeps_its_shape(
     pivot: tuple[float, float, float],
 ) -> None:
     """Under moves, turns and even scaling every corner goes where the matrix says."""
-    delta = affine(move, turn, (size, size, size))
-    about = affine(pivot) @ delta @ affine(tuple(-p for p in pivot))  # type: ignore[arg-type]
+    delta = matrix_of(move, turn, (size, size, size))
+    about = matrix_of(pivot) @ delta @ matrix_of(tuple(-p for p in pivot))  # type: ignore[arg-type]
     scene = edits.transform_objects(SCENE, ("cube", "ball"), delta, pivot)
     assert diff(SCENE, scene).moved <= {"cube", "ball"}
     for name in ("cube", "ball"):
         old, new = SCENE.object(name), scene.object(name)
-        corners = transform.box_corners(old.mesh.bounds)
-        expected = transform.apply_affine(about[:3], transform.apply_affine(old.world_from_object, corners))
-        found = transform.apply_affine(new.world_from_object, corners)
+        corners = affine.box_corners(old.mesh.bounds)
+        expected = affine.apply(about[:3], affine.apply(old.world_from_object, corners))
+        found = affine.apply(new.world_from_object, corners)
         np.testing.assert_allclose(found, expected, atol=1e-3)
         assert new.scale == pytest.approx([s * size for s in old.scale], rel=1e-4)
 
 
 def test_moving_keeps_angles_and_scale_to_the_bit() -> None:
-    moved = edits.transform_objects(SCENE, ("cube",), affine((1, 2, 3))).object("cube")
+    moved = edits.transform_objects(SCENE, ("cube",), matrix_of((1, 2, 3))).object("cube")
     assert moved == replace(SCENE.object("cube"), position=(1, 2.5, 3))
 
 
 def test_turning_keeps_the_scale_and_scaling_the_angles_to_the_bit() -> None:
     noise = 1 + np.float32(1e-7)
-    turned = edits.transform_objects(SCENE, ("cube",), affine(rotation=(0, 40, 0)) * noise).object("cube")
+    turned = edits.transform_objects(SCENE, ("cube",), matrix_of(rotation=(0, 40, 0)) * noise).object("cube")
     assert turned.scale == (1, 2, 3) and turned.rotation != (10, 20, 30)
-    scaled = edits.transform_objects(SCENE, ("cube",), affine(scale=(2, 2, 2))).object("cube")
+    scaled = edits.transform_objects(SCENE, ("cube",), matrix_of(scale=(2, 2, 2))).object("cube")
     assert scaled.rotation == (10, 20, 30) and scaled.scale == pytest.approx((2, 4, 6))
 
 
 def test_numbers_stay_within_what_a_scene_allows() -> None:
-    tiny = edits.transform_objects(SCENE, ("cube",), affine(scale=(1e-12, 1e-12, 1e-12))).object("cube")
+    tiny = edits.transform_objects(SCENE, ("cube",), matrix_of(scale=(1e-12, 1e-12, 1e-12))).object("cube")
     assert min(tiny.scale) == 1e-6
-    flat = edits.transform_objects(SCENE, ("cube",), affine(scale=(1, 0, 1))).object("cube")
+    flat = edits.transform_objects(SCENE, ("cube",), matrix_of(scale=(1, 0, 1))).object("cube")
     assert flat == SCENE.object("cube")
-    far = edits.transform_objects(SCENE, ("cube",), affine((1e12, 0, 0))).object("cube")
+    far = edits.transform_objects(SCENE, ("cube",), matrix_of((1e12, 0, 0))).object("cube")
     assert far.position == (1e9, 0.5, 0)
 
 

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from incpt.core import transform
+from incpt.core import affine
 from incpt.core.errors import InputError
 from incpt.scene import edits
 from incpt.scene.change import affected_objects, diff
@@ -37,7 +37,7 @@ shears = st.tuples(*[st.floats(-1.5, 1.5)] * 3)
 @st.composite
 def matrices(draw: st.DrawFn) -> Matrix:
     """Scaled, sheared, turned, moved; mirrored or not."""
-    world = transform.world_from_object(draw(vectors), draw(angles), (1, 1, 1))
+    world = affine.compose(draw(vectors), draw(angles), (1, 1, 1))
     xy, xz, yz = draw(shears)
     world[:, :3] = world[:, :3] @ np.array([[1, xy, xz], [0, 1, yz], [0, 0, 1]]) * draw(scales)
     return world
@@ -53,7 +53,7 @@ def test_numbers_stay_as_they_were_typed(position: Any, rotation: Any, scale: An
     placed = Transform(position, rotation, scale)
     assert (placed.position, placed.rotation, placed.scale) == (position, rotation, scale)
     assert placed.matrix is None
-    assert np.array_equal(placed.world_from_object, transform.world_from_object(position, rotation, scale))
+    assert np.array_equal(placed.world_from_object, affine.compose(position, rotation, scale))
     assert placed == Transform(position, rotation, scale) and hash(placed) == hash(replace(placed))
 
 
@@ -71,7 +71,7 @@ def test_a_matrix_is_kept_exactly(matrix: Matrix) -> None:
 @quick
 @given(vectors, angles, scales)
 def test_without_shear_the_numbers_say_all_of_a_matrix(position: Any, rotation: Any, scale: Any) -> None:
-    matrix = transform.world_from_object(position, rotation, scale)
+    matrix = affine.compose(position, rotation, scale)
     placed = Transform.from_matrix(matrix)
     numbers = Transform(placed.position, placed.rotation, placed.scale)
     np.testing.assert_allclose(numbers.world_from_object, matrix, atol=1e-4)
@@ -93,7 +93,7 @@ def test_another_rotation_turns_a_matrix_about_its_position(matrix: Matrix, rota
     np.testing.assert_allclose(new.rotation, rotation, atol=1e-3)
     np.testing.assert_allclose(new.scale, old.scale, rtol=1e-6)
     assert new.position == old.position
-    turn = transform.rotation_matrix(rotation) @ transform.rotation_matrix(old.rotation).T
+    turn = affine.rotation_matrix(rotation) @ affine.rotation_matrix(old.rotation).T
     close(new.world_from_object[:, :3], turn @ matrix[:, :3])
     # The lengths of the axes and the angles between them are what a rotation leaves alone.
     close(new.world_from_object[:, :3].T @ new.world_from_object[:, :3], matrix[:, :3].T @ matrix[:, :3])
@@ -199,7 +199,7 @@ def test_an_object_takes_numbers_a_matrix_or_a_transform() -> None:
 
 def test_bounds_under_a_matrix_hold_every_corner() -> None:
     odd = SCENE.object("odd")
-    corners = transform.apply_affine(SHEARED, odd.mesh.vertices)
+    corners = affine.apply(SHEARED, odd.mesh.vertices)
     np.testing.assert_allclose(odd.world_bounds, [corners.min(axis=0), corners.max(axis=0)])
 
 
@@ -219,10 +219,10 @@ def test_a_gizmo_keeps_the_shear_of_a_matrix(matrix: Matrix, delta: Matrix, pivo
     """Whatever the matrix of the movement is, every corner goes where it says."""
     scene = SCENE.with_object("odd", matrix=matrix)
     moved = edits.transform_objects(scene, ("odd",), np.vstack([delta, [0, 0, 0, 1]]), pivot).object("odd")
-    corners = transform.box_corners(moved.mesh.bounds)
-    before = transform.apply_affine(matrix, corners)
-    expected = transform.apply_affine(delta, before - pivot) + pivot
-    found = transform.apply_affine(moved.world_from_object, corners)
+    corners = affine.box_corners(moved.mesh.bounds)
+    before = affine.apply(matrix, corners)
+    expected = affine.apply(delta, before - pivot) + pivot
+    found = affine.apply(moved.world_from_object, corners)
     assert moved.transform.matrix is not None
     np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max() + 1e-6)
 
@@ -238,7 +238,7 @@ def test_a_matrix_that_would_be_flattened_stays_as_it_was() -> None:
 def test_turning_a_matrix_by_a_gizmo_does_not_make_its_angles_jump(matrix: Matrix) -> None:
     scene = SCENE.with_object("odd", matrix=matrix)
     turn = np.eye(4)
-    turn[:3, :3] = transform.rotation_matrix((0, 7, 0))
+    turn[:3, :3] = affine.rotation_matrix((0, 7, 0))
     for _ in range(60):
         old = scene.object("odd")
         scene = edits.transform_objects(scene, ("odd",), turn, old.position)

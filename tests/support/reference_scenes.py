@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from incpt.core.transform import Vector
+from incpt.core.affine import Vector
 from incpt.formats.images import load_image
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core import transform
+from incpt.core import affine
 from incpt.scene.camera import Camera
 from incpt.scene.model import Object
 from incpt.ui.rect import Rect
@@ -44,9 +44,7 @@ def clip_from_world(
 ) -> npt.NDArray[np.float64]:
     """(4, 4) matrix that projects world space as the path tracer does, for an image that lies at `rect_px`
     and a viewport that covers `part` of it. Depth only clips what lies behind the camera."""
-    right, up, forward = transform.camera_frame(
-        camera.position, camera.target, camera.up, camera.fov_y, aspect
-    )
+    right, up, forward = camera.image_plane(aspect)
     rows = np.stack([right / (right @ right), up / (up @ up), forward])
     view = np.column_stack([rows, -rows @ np.asarray(camera.position, np.float64)])
     across, down, depth = view
@@ -70,9 +68,8 @@ def covered(
     margin: int,
 ) -> Rect[int] | None:
     """The pixels of `part` that objects may cover, with a margin; None where there are none."""
-    frame = transform.camera_frame(camera.position, camera.target, camera.up, camera.fov_y, aspect)
-    corners = np.concatenate([transform.box_corners(o.world_bounds) for o in objects])
-    pixels, in_front = transform.project(corners, camera.position, frame, (1, 1))
+    corners = np.concatenate([affine.box_corners(o.world_bounds) for o in objects])
+    pixels, in_front = camera.project(corners, aspect)
     if not in_front.all():
         # A box that reaches behind the camera covers more than the rectangle around its projected corners.
         return part

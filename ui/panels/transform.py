@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from incpt.core.transform import Vector
+from incpt.core.affine import Vector
 from incpt.scene.model import Object
 from incpt.scene.transform import Transform
 from incpt.ui.widgets import widgets

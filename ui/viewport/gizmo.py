@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from imgui_bundle import imgui, imguizmo
 
-from incpt.core import transform
+from incpt.core import affine
 from incpt.scene import edits
 from incpt.scene.camera import Camera
 from incpt.scene.model import Scene
@@ -110,17 +110,17 @@ def pivot(scene: Scene, names: tuple[str, ...], space: str) -> Matrix:
     active = scene.object(names[-1])
     matrix = np.eye(4)
     if len(names) == 1:
-        matrix[:3] = transform.world_from_object(active.position, active.rotation, active.scale)
+        matrix[:3] = affine.compose(active.position, active.rotation, active.scale)
     else:
         if space == "local":
-            matrix[:3, :3] = transform.rotation_matrix(active.rotation)
+            matrix[:3, :3] = affine.rotation_matrix(active.rotation)
         matrix[:3, 3] = np.mean([scene.object(name).position for name in names], axis=0)
     return matrix
 
 
 def view_matrix(camera: Camera) -> Matrix:
     """(4, 4) camera from world; the camera looks along -z, as OpenGL has it."""
-    right, up, forward = transform.camera_frame(camera.position, camera.target, camera.up, camera.fov_y, 1.0)
+    right, up, forward = camera.image_plane(1.0)
     rows = np.array([right / np.linalg.norm(right), up / np.linalg.norm(up), -forward])
     matrix = np.eye(4)
     matrix[:3, :3] = rows

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 import numpy as np
 from imgui_bundle import imgui
 
-from incpt.core.transform import Vector
+from incpt.core.affine import Vector
 from incpt.ui.widgets import places, theme
 
 _AXES = ("X", "Y", "Z")

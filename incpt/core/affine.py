@@ -1,5 +1,7 @@
-"""Affine transforms and the camera's geometry. Matrices act on column vectors; world space is
-right-handed with y up, in metres."""
+"""Affine matrices: making them of position, rotation and scale, taking them apart, applying them.
+
+A matrix is (3, 4), float64, and acts on column vectors. World space is right-handed with y up, in metres.
+"""
 
 from __future__ import annotations
 
@@ -29,10 +31,8 @@ def rotation_matrix(rotation_deg: Sequence[float]) -> Array:
     return result
 
 
-def world_from_object(
-    position: Sequence[float], rotation_deg: Sequence[float], scale: Sequence[float]
-) -> Array:
-    """(3, 4) affine matrix that scales, rotates and then moves."""
+def compose(position: Sequence[float], rotation_deg: Sequence[float], scale: Sequence[float]) -> Array:
+    """(3, 4) affine matrix that scales by axis, then rotates (see `rotation_matrix`), then moves."""
     matrix = np.empty((3, 4))
     matrix[:, :3] = rotation_matrix(rotation_deg) * np.asarray(scale, np.float64)
     matrix[:, 3] = position
@@ -44,7 +44,7 @@ def decompose(
     near_rotation_deg: Sequence[float] = (0.0, 0.0, 0.0),
     sign_of_scale: Sequence[float] = (1.0, 1.0, 1.0),
 ) -> tuple[Vector, Vector, Vector]:
-    """(position, rotation in degrees, scale) whose `world_from_object` is a (3, 4) affine matrix.
+    """(position, rotation in degrees, scale) of which `compose` makes a (3, 4) affine matrix.
 
     Shear is dropped: the rotation is the orthogonal factor of the polar decomposition of the axes at unit
     length (the rotation nearest to their directions, however long they are), the scale is the length of each
@@ -100,13 +100,13 @@ def _y_and_z(rotation: Array, x: float) -> tuple[float, float]:
     return y, math.atan2(-without_x[0, 1], without_x[1, 1])
 
 
-def invert_affine(matrix: Array) -> Array:
+def invert(matrix: Array) -> Array:
     """Inverse of a (3, 4) affine matrix, (3, 4). Raises numpy.linalg.LinAlgError where it is singular."""
     linear = np.linalg.inv(matrix[:, :3])
     return np.column_stack([linear, -linear @ matrix[:, 3]])
 
 
-def apply_affine(matrix: Array, points: npt.NDArray[np.floating]) -> Array:
+def apply(matrix: Array, points: npt.NDArray[np.floating]) -> Array:
     """(N, 3) points, moved by a (3, 4) affine matrix."""
     result: Array = points @ matrix[:, :3].T + matrix[:, 3]
     return result
@@ -117,50 +117,6 @@ def box_corners(bounds: npt.NDArray[np.floating]) -> Array:
     choose = np.array([[(i >> axis) & 1 for axis in range(3)] for i in range(8)])
     corners: Array = np.asarray(bounds, np.float64)[choose, np.arange(3)]
     return corners
-
-
-def camera_frame(
-    position: Sequence[float],
-    target: Sequence[float],
-    up: Sequence[float],
-    fov_y_deg: float,
-    aspect: float,
-) -> tuple[Array, Array, Array]:
-    """(right, up, forward), each (3,): the image plane at unit distance, half its width and height long."""
-    forward = _unit(np.subtract(target, position))
-    right = np.cross(forward, _unit(np.asarray(up, np.float64)))
-    if np.linalg.norm(right) < 1e-9:  # looking along `up`: any other axis gives a frame
-        right = np.cross(forward, [0.0, 0.0, 1.0] if abs(forward[2]) < 0.9 else [1.0, 0.0, 0.0])
-    right = _unit(right)
-    half_height = math.tan(math.radians(fov_y_deg) / 2)
-    return right * half_height * aspect, np.cross(right, forward) * half_height, forward
-
-
-def project(
-    points: npt.NDArray[np.floating],
-    position: Sequence[float],
-    frame: tuple[Array, Array, Array],
-    size: tuple[int, int],
-) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """Pixel coordinates (N, 2) of (N, 3) world points, and which of them lie in front of the camera.
-
-    `frame` comes from `camera_frame`, `size` is (width, height) in pixels; pixel (0, 0) spans [0, 1]^2
-    at the top left. Coordinates of points behind the camera mean nothing.
-    """
-    right, up, forward = frame
-    offset = np.asarray(points, np.float64) - np.asarray(position, np.float64)
-    depth = offset @ forward
-    in_front = depth > 1e-6
-    depth = np.where(in_front, depth, 1.0)
-    x = offset @ right / (right @ right) / depth
-    y = offset @ up / (up @ up) / depth
-    pixels = np.column_stack([(x + 1) / 2 * size[0], (1 - y) / 2 * size[1]])
-    return pixels, in_front
-
-
-def _unit(vector: Array) -> Array:
-    result: Array = vector / np.linalg.norm(vector)
-    return result
 
 
 def _vector(values: Array) -> Vector:
