@@ -80,7 +80,7 @@ def _euler_angles(rotation: Array, near_deg: Array) -> Array:
     """(3,) angles about x, then y, then z, degrees, that give a (3, 3) rotation, nearest to `near_deg`."""
     sin_y, cos_y = -rotation[2, 0], math.hypot(rotation[2, 1], rotation[2, 2])
     if cos_y < GIMBAL_LOCK:
-        # Only x - z (at y = 90°) or x + z is determined: both change by half of what is missing.
+        # Only x - z (at y = 90°) or x + z is determined, so both change by half of what is missing.
         z = math.degrees(_y_and_z(rotation, math.radians(near_deg[0]))[1])
         missing = (z - near_deg[2] + 180) % 360 - 180
         choices = [math.radians(near_deg[0] - math.copysign(0.5, sin_y) * missing)]

@@ -1,4 +1,4 @@
-"""Leaves out the faces of a file that cannot be rendered, counts them, and makes a mesh of the rest."""
+"""Bad faces of mesh files: leaves them out, counts them, and makes a mesh of the rest."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ def usable_mesh(
     if not usable.any():
         return None
     finite = np.all(np.abs(stored) <= LARGEST, axis=1)
-    stored = np.where(finite[:, None], stored, np.float32(0))  # no face uses those any more
+    # No face uses these vertices any more, but a mesh holds finite ones only.
+    stored = np.where(finite[:, None], stored, np.float32(0))
     faces = faces[usable]
     corner_normals = None if normals is None else _corner_normals(stored, faces, normals)
     return Mesh(stored, faces.astype(np.int32), corner_normals)
@@ -42,14 +43,15 @@ def usable_mesh(
 def _usable_faces(
     vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int64], counts: dict[str, int]
 ) -> npt.NDArray[np.bool_]:
-    """(F,) which faces to keep; the reasons against the others are counted."""
+    """(F,) which faces of vertices (V, 3) to keep; the reasons against the others are counted."""
     usable: npt.NDArray[np.bool_] = np.all((faces >= 0) & (faces < len(vertices)), axis=1)
     in_range = np.where(usable[:, None], faces, 0)
     _count(counts, "in all", len(faces))
     _count(counts, "with an index out of range", int((~usable).sum()))
     if not len(vertices):
         return usable
-    finite = np.all(np.abs(vertices) <= LARGEST, axis=1)  # False for NaN too
+    # This comparison is false for NaN too.
+    finite = np.all(np.abs(vertices) <= LARGEST, axis=1)
     bad = usable & ~finite[in_range].all(axis=1)
     _count(counts, "with a vertex that is not finite or too far away", int(bad.sum()))
     usable &= ~bad
@@ -83,7 +85,8 @@ def _repeated(
     corners = place[faces[usable]]
     turn = (corners.argmin(axis=1)[:, None] + np.arange(3)) % 3
     corners = np.take_along_axis(corners, turn, axis=1)
-    order = np.lexsort(corners.T)  # stable: the first of equal faces comes first
+    # The sort is stable, so the first of equal faces comes first.
+    order = np.lexsort(corners.T)
     again = np.zeros(len(corners), bool)
     again[order[1:]] = np.all(corners[order[1:]] == corners[order[:-1]], axis=1)
     result: npt.NDArray[np.bool_] = np.zeros(len(faces), bool)
@@ -94,7 +97,7 @@ def _repeated(
 def _corner_normals(
     vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int64], normals: npt.NDArray[np.float64]
 ) -> npt.NDArray[np.float32]:
-    """(F, 3, 3) unit normals; the face's own where the file's have no direction."""
+    """(F, 3, 3) unit normals of (V, 3) normals at the vertices; a face's own where one has no direction."""
     with np.errstate(all="ignore"):
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         unit = normals / lengths

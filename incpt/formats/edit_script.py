@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -27,9 +27,14 @@ from incpt.core.errors import InputError, in_place
 from incpt.core.files import check_readable
 from incpt.formats import images
 from incpt.formats.mesh_library import MeshLibrary
+from incpt.formats.scene_toml import (
+    CAMERA_KEYS,
+    ENVIRONMENT_KEYS,
+    MATERIAL_KEYS,
+    MESH_KEYS,
+    PLACEMENT_KEYS,
+)
 from incpt.formats.toml_kit import check_keys, quoted, read_toml, text_of
-from incpt.scene.camera import Camera
-from incpt.scene.material import Material
 from incpt.scene.model import Scene
 
 KINDS = ("object", "material", "camera", "environment")
@@ -39,10 +44,10 @@ MAX_STEP = 10_000_000
 _FILE_KEYS = ("capture", "cumulative", "edits")
 _EDIT_KEYS = ("name", "step", "pixel", "capture")
 _VALUE_KEYS: dict[str, tuple[str, ...]] = {
-    "object": ("position", "rotation", "scale", "matrix", "visible", "material", "shape", "mesh", "part"),
-    "material": tuple(field.name for field in fields(Material)),
-    "camera": tuple(field.name for field in fields(Camera)),
-    "environment": ("color", "image", "rotation_y", "intensity"),
+    "object": (*PLACEMENT_KEYS, "material", *MESH_KEYS),
+    "material": MATERIAL_KEYS,
+    "camera": CAMERA_KEYS,
+    "environment": ENVIRONMENT_KEYS,
 }
 
 
@@ -176,7 +181,7 @@ def _target(table: dict[str, Any]) -> tuple[str, str | None, dict[str, Any]]:
 
 def _changes(values: dict[str, Any], library: MeshLibrary) -> dict[str, Any]:
     """The values as `Scene.with_*` take them: files are read."""
-    changes = {key: value for key, value in values.items() if key not in ("shape", "mesh", "part")}
+    changes = {key: value for key, value in values.items() if key not in MESH_KEYS}
     if len(changes) < len(values):
         meshes = library.meshes(values)
         if len(meshes) > 1:

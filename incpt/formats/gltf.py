@@ -1,4 +1,4 @@
-"""glTF headers: what must be refused before trimesh reads the file, and materials."""
+"""glTF: what must be refused before trimesh reads the file, and materials, which trimesh leaves out."""
 
 from __future__ import annotations
 
@@ -15,14 +15,16 @@ from incpt.core.files import check_readable, read_bytes
 from incpt.scene.material import Material
 
 MAX_UNSTORED_ITEMS = 100_000_000
-"""Of a glTF accessor without data, for which trimesh allocates zeros: a damaged count may be anything."""
+"""The most values that an accessor without data may claim. trimesh allocates zeros for them, and the count of
+a damaged file may be anything."""
 _UNREADABLE_EXTENSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 _DRACO = "KHR_draco_mesh_compression"
 _GLTF_LINES_POINTS_TRIANGLES_STRIPS = (0, 1, 4, 5)
 
 
 def gltf_header(path: Path, suffix: str) -> dict[str, Any]:
-    """The JSON of a glTF file, after a check for what trimesh reads wrongly. Raises InputError."""
+    """The JSON of a .glb or .gltf file (`suffix` without its dot), after a check for what trimesh reads
+    wrongly. Raises InputError."""
     content = read_bytes(path)
     try:
         if suffix == "glb":
@@ -34,7 +36,7 @@ def gltf_header(path: Path, suffix: str) -> dict[str, Any]:
         _check_gltf(header, path)
     except InputError:
         raise
-    except Exception as error:  # JSON of any shape: a list for a table, a text for a number …
+    except Exception as error:  # JSON may have any shape: a list for a table, a text for a number …
         raise InputError(f"is no {suffix.upper()} mesh, or a damaged one ({reason_of(error)})") from None
     result: dict[str, Any] = header
     return result
@@ -78,7 +80,11 @@ def _check_primitive(primitive: dict[str, Any], accessors: list[dict[str, Any]])
 def gltf_materials(
     header: dict[str, Any], geometries: list[str]
 ) -> dict[str, tuple[str | None, Material | None]]:
-    """Material by name of trimesh's geometry, which is one for every primitive, in the file's order."""
+    """Name and material by name of trimesh's geometry; empty where the two cannot be matched.
+
+    `header` is what `gltf_header` returns. trimesh makes a geometry of every primitive, in the file's order,
+    which are `geometries` here.
+    """
     primitives = [
         primitive
         for mesh in header.get("meshes", [])
@@ -94,7 +100,7 @@ def gltf_materials(
             table = header["materials"][index]
             result[name] = (str(table.get("name") or f"material {index}"), _gltf_material(table))
         except (KeyError, IndexError, TypeError, ValueError, AttributeError):
-            continue  # a material that is not there or out of range: the default one is used
+            continue  # The default material is used in place of one that is missing or out of range.
     return result
 
 

@@ -30,6 +30,7 @@ from incpt.scene.image import Image
 Float32Image = npt.NDArray[np.float32]
 RINGING = 0.01
 """How far below zero, as a fraction of the mean, a pixel may lie to count as an artefact of compression."""
+
 _quiet_lock = threading.Lock()
 _images: weakref.WeakValueDictionary[tuple[str, int, int], Image] = weakref.WeakValueDictionary()
 
@@ -137,7 +138,7 @@ def _pixels(path: Path) -> Float32Image:
             }
     except InputError:
         raise
-    except Exception:  # the library raises RuntimeError, ValueError, TypeError … for damaged files
+    except Exception:  # The library raises RuntimeError, ValueError, TypeError … for damaged files.
         raise InputError("is no OpenEXR image, or a damaged one; save it again as OpenEXR") from None
     if pixels and all(isinstance(p, np.ndarray) and p.ndim == 2 for p in pixels.values()):
         for names in _colour_names(set(pixels)):
@@ -178,7 +179,7 @@ def _quiet() -> Iterator[None]:
 
     with _quiet_lock, redirect_stdout(io.StringIO()):
         saved = []
-        with suppress(OSError):  # a process started without them
+        with suppress(OSError):  # A process may have been started without them.
             saved = [(number, os.dup(number)) for number in (1, 2)]
         null = os.open(os.devnull, os.O_WRONLY)
         try:
@@ -186,7 +187,8 @@ def _quiet() -> Iterator[None]:
                 os.dup2(null, number)
             yield
         finally:
-            # Its threads may still be at work, and print, after one of them has raised an error.
+            # OpenEXR's threads may still be at work, and print, after one of them has raised an error. Taking
+            # them away waits for their end.
             threads = OpenEXR.global_thread_count()
             OpenEXR.set_global_thread_count(0)
             OpenEXR.set_global_thread_count(threads)

@@ -54,7 +54,7 @@ def set_environment_image(scene: Scene, path: str | os.PathLike[str]) -> Scene:
     """The scene lit by an OpenEXR image at its own radiance. Raises InputError."""
     image = images.load_image(path)
     old = scene.environment
-    # A colour that stood alone was a radiance; beside an image it would tint it, and black hide it.
+    # A colour that stood alone was a radiance. Beside an image it would tint the image, or hide it by black.
     color = old.color if old.image is not None and any(old.color) else (1.0, 1.0, 1.0)
     intensity = old.intensity if old.image is not None and old.intensity > 0 else 1.0
     return replace(scene, environment=Environment(color, image, old.rotation_y, intensity))

@@ -44,7 +44,8 @@ def _arrays(mesh: Mesh) -> dict[str, npt.NDArray[Any]]:
 
 
 def read_stored(path: Path) -> tuple[MeshPart, ...]:
-    """The mesh of an .npz archive as the only part of the file. Raises InputError."""
+    """The mesh of an .npz archive, which `store_mesh` wrote, as the only part of the file. Raises
+    InputError."""
     try:
         with np.load(io.BytesIO(read_bytes(path)), allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in ("vertices", "faces", "normals") if name in archive}
@@ -52,5 +53,5 @@ def read_stored(path: Path) -> tuple[MeshPart, ...]:
         return (MeshPart(None, Mesh(vertices, faces, normals, MeshSource(file=os.path.abspath(path)))),)
     except InputError:
         raise
-    except Exception:  # zipfile, zlib and numpy raise whatever comes up
+    except Exception:  # zipfile, zlib and numpy raise errors of many types for damaged files.
         raise InputError("is no mesh archive with `vertices` and `faces`, or a damaged one") from None

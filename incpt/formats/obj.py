@@ -1,4 +1,4 @@
-"""OBJ files that trimesh cannot read as they are: rewrites them before it sees them."""
+"""OBJ: rewrites files that trimesh cannot read as they are."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ _OBJ_ROWS = {b"v": 0, b"vt": 1, b"vn": 2}
 
 
 def utf8(content: bytes) -> bytes:
-    """Text of older programs is Latin-1, for which trimesh would need another library."""
+    """The same text as UTF-8. That of older programs is Latin-1, for which trimesh would need another
+    library."""
     try:
         content.decode()
     except UnicodeDecodeError:
@@ -19,8 +20,8 @@ def utf8(content: bytes) -> bytes:
 
 
 def absolute_obj(content: bytes) -> tuple[bytes, int]:
-    """The same file with triangles only, indices counted from 1, without faces that use a vertex that is
-    not there; and how many those were. Raises ValueError for an index that is no number."""
+    """The same file with triangles only and with indices counted from 1, and how many faces were left out
+    because they use a vertex that is not there. Raises ValueError for an index that is no number."""
     lines = [
         (line, line.split(b"#")[0].split())
         for line in content.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines()

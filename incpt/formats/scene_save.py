@@ -1,4 +1,4 @@
-"""Writing scene files."""
+"""Scene files: TOML from a Scene, and the meshes and images that no file holds yet beside it."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ class _Beside:
         absolute = os.path.join(os.path.realpath(os.path.dirname(file)), os.path.basename(file))
         try:
             return os.path.relpath(absolute, os.path.realpath(self._folder)).replace(os.sep, "/")
-        except ValueError:  # another drive
+        except ValueError:  # No relative path leads to another drive.
             return os.path.abspath(file)
 
 
@@ -169,7 +169,7 @@ def _object_table(obj: Object, beside: _Beside) -> dict[str, Any]:
 
 
 def _changed(owner: Any) -> dict[str, Any]:
-    """The fields of a dataclass that differ from their defaults."""
+    """The fields of a dataclass that differ from their defaults, as TOML has them."""
     return {
         field.name: _toml(getattr(owner, field.name))
         for field in fields(owner)

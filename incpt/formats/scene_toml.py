@@ -1,8 +1,8 @@
-"""Scene files: TOML, version 1, to and from a Scene.
+"""Scene files: a Scene from TOML, version 1. `scene_save` writes them.
 
 Every value is checked where it stands, so that an error reads `scenes/a.toml: [[objects]] 3 ("red cube"):
-position: nan is not a finite number`. What a scene may hold is told by the dataclasses of `scene.py` alone:
-their field names are the keys, their own checks the ranges.
+position: nan is not a finite number`. What a scene may hold is told by the dataclasses of `incpt.scene`
+alone: their field names are the keys, their own checks the ranges.
 """
 
 from __future__ import annotations
@@ -26,11 +26,12 @@ from incpt.scene.model import Object, Scene
 _T = TypeVar("_T")
 VERSION = 1
 _TABLES = ("version", "camera", "environment", "render", "materials", "objects")
-CAMERA_KEYS = ("position", "target", "up", "fov_y")
-_ENVIRONMENT_KEYS = ("color", "image", "rotation_y", "intensity")
-_PLACEMENT_KEYS = ("position", "rotation", "scale", "matrix")
-_OBJECT_KEYS = ("name", "shape", "mesh", "part", "material", *_PLACEMENT_KEYS, "visible")
-_MATERIAL_KEYS = tuple(field.name for field in fields(Material))
+CAMERA_KEYS = tuple(field.name for field in fields(Camera))
+ENVIRONMENT_KEYS = tuple(field.name for field in fields(Environment))
+MATERIAL_KEYS = tuple(field.name for field in fields(Material))
+PLACEMENT_KEYS = ("position", "rotation", "scale", "matrix", "visible")
+MESH_KEYS = ("shape", "mesh", "part")
+_OBJECT_KEYS = ("name", *MESH_KEYS, "material", *PLACEMENT_KEYS)
 
 
 def load_scene_toml(path: Path) -> Scene:
@@ -63,7 +64,7 @@ def _built(kind: type[_T], table: Mapping[str, Any], known: Collection[str]) -> 
 
 
 def _environment(table: dict[str, Any], folder: Path) -> Environment:
-    check_keys(table, _ENVIRONMENT_KEYS)
+    check_keys(table, ENVIRONMENT_KEYS)
     values = dict(table)
     if "image" in values:
         with in_place("image"):
@@ -79,7 +80,7 @@ def _materials(tables: dict[str, Any]) -> dict[str, Material]:
         with in_place(f"[materials.{name if name.isidentifier() else quoted(name)}]"):
             if not isinstance(table, dict):
                 raise InputError("is not a table; write its values below")
-            materials[name] = _built(Material, table, _MATERIAL_KEYS)
+            materials[name] = _built(Material, table, MATERIAL_KEYS)
     return materials
 
 
@@ -112,7 +113,7 @@ def _object(table: dict[str, Any], materials: Mapping[str, Material], library: M
         close = get_close_matches(material, materials, 1)
         hint = f"did you mean {close[0]!r}?" if close else f"add [materials.{material}]"
         raise InputError(f"material: {material!r} is not in [materials]; {hint}")
-    placement = {k: v for k, v in table.items() if k in (*_PLACEMENT_KEYS, "visible")}
+    placement = {k: v for k, v in table.items() if k in PLACEMENT_KEYS}
     meshes = library.meshes(table)
     names = [name] if len(meshes) == 1 else [f"{name}/{part}" for part, _ in meshes]
     return [Object(n, mesh, material, **placement) for n, (_, mesh) in zip(names, meshes, strict=True)]

@@ -3,9 +3,6 @@
 trimesh is lenient where a renderer must not be: it makes up vertex normals, keeps faces that point at no
 vertex, fills a Draco-compressed glTF with zeros, and raises whatever comes up on damaged files. Every way
 out of this module is a usable Mesh or an InputError; what had to be left out is told by an InputWarning.
-
-A mesh made in Python is stored as .npz (vertices, faces, normals): no interchange format keeps normals per
-corner without splitting vertices.
 """
 
 from __future__ import annotations
@@ -129,14 +126,15 @@ def _quiet() -> Iterator[list[str]]:
 def _load(path: Path, suffix: str, content: bytes | None = None) -> trimesh.Scene:
     options: dict[str, Any] = {"process": False}
     if suffix in ("obj", "ply", "glb", "gltf"):
-        options["skip_materials"] = True  # textures are not used: no file but this one is opened
+        # Textures are not used, so that no file but this one is opened.
+        options["skip_materials"] = True
     if suffix == "obj":
         options |= {"split_objects": True, "group_material": False}
     try:
         with _quiet() as messages:
             stream: Any = str(path) if content is None else io.BytesIO(content)
             loaded = trimesh.load_scene(stream, file_type=suffix, **options)
-    except Exception as error:  # any type at all on a damaged file; see the module's docstring
+    except Exception as error:  # trimesh raises errors of any type for a damaged file.
         raise InputError(f"is no {suffix.upper()} mesh, or a damaged one ({reason_of(error)})") from None
     if any("placeholder zeros" in message for message in messages):
         raise InputError("is compressed in a way that cannot be decoded; export it uncompressed")

@@ -21,20 +21,23 @@ AGX_INSET = np.array(
         [0.0423756549057051, 0.0784336, 0.879142973793104],
     ]
 )
-AGX_INSET /= AGX_INSET.sum(axis=1, keepdims=True)  # printed digits sum to 1.0001: greys took a tint
+# The rows of the printed digits sum to 1.0001, by which greys took a tint.
+AGX_INSET /= AGX_INSET.sum(axis=1, keepdims=True)
+"""(3, 3): mixes linear RGB before the curve, so that a saturated colour is none for the curve."""
 AGX_OUTSET = np.linalg.inv(AGX_INSET)
+"""(3, 3): undoes the mixture after the curve."""
 AGX_LOG2_RANGE = (-12.47393, 4.026069)
-
-
-# Of x^6 down to 1; Wrensch's fit, mean squared error 3.7e-6.
+"""The radiances that become 0 and 1, as powers of two."""
 AGX_POLYNOMIAL = (15.5, -40.14, 31.96, -6.868, 0.4298, 0.1191, -0.00232)
-
-
-# Hable's shoulder strength, linear strength and angle, toe strength, numerator and denominator.
+"""The curve: factors of x^6 down to 1. It is Wrensch's fit, with a mean squared error of 3.7e-6."""
 HABLE_CURVE = (0.15, 0.50, 0.10, 0.20, 0.02, 0.30)
+"""Hable's shoulder strength, linear strength and angle, toe strength, numerator and denominator."""
 HABLE_WHITE = 11.2
+"""The radiance, times its factor, that becomes 1."""
 HABLE_EXPOSURE_BIAS = 2.0
+"""The factor of the radiance in front of the curve."""
 UNDEFINED_PIXEL = (255, 0, 255)
+"""What NaN is shown as."""
 
 
 def tone_map(linear: npt.ArrayLike, exposure: float = 0.0, curve: str = "agx") -> npt.NDArray[np.uint8]:

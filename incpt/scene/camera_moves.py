@@ -22,17 +22,18 @@ from incpt.scene.camera import Camera
 Array = npt.NDArray[np.float64]
 
 MAX_ELEVATION_DEG = 89.9
-"""Above it the horizon's direction would be lost in rounding, and the view flip over the pole."""
+"""The highest elevation. Above it the horizon's direction would be lost in rounding, and the view would flip
+over the pole."""
 ORBIT_DEG = 180.0
-"""Turned by a drag over the whole height of the picture."""
+"""How far the camera turns about its target by a drag over the whole height of the picture."""
 LOOK_DEG = 90.0
-"""The same while the camera turns in place."""
+"""How far the camera turns in place by a drag over the whole height of the picture."""
 WHEEL_FACTOR = 0.85
-"""Of the distance to the target, for one notch of the wheel towards it."""
+"""One notch of the wheel towards the target multiplies the distance by this."""
 DOLLY_FACTOR = 8.0
-"""Of the distance, for a drag over the whole height of the picture."""
+"""A drag over the whole height of the picture divides or multiplies the distance by this."""
 FRAME_MARGIN = 1.1
-"""Of the picture over what is framed in it."""
+"""The size of the picture over that of what is framed in it."""
 FRAME_CLEARANCE = 0.1
 """Least distance from the nearest corner of what is framed, in diagonals of its box."""
 NEAREST = 1e-3
@@ -108,14 +109,14 @@ def frame(camera: Camera, bounds: npt.ArrayLike, aspect: float) -> Camera:
     that aspect (width by height), with a tenth of margin. `bounds` is (2, 3), world space, metres."""
     box = np.asarray(bounds, np.float64)
     middle = box.mean(axis=0)
-    if np.ptp(box, axis=0).max() < NEAREST:  # a point: any distance shows it
+    if np.ptp(box, axis=0).max() < NEAREST:  # The box is a point, which any distance shows.
         box = np.stack([middle - NEAREST / 2, middle + NEAREST / 2])
     right, up, forward = camera.image_plane(aspect)
     offset = affine.box_corners(box) - middle
     x = np.abs(offset @ right) / (right @ right)
     y = np.abs(offset @ up) / (up @ up)
     depth = offset @ forward
-    # A plate or a rod seen along itself would else be looked at from its very edge.
+    # Without a clearance, a plate or a rod seen along itself would be looked at from its very edge.
     clearance = FRAME_CLEARANCE * float(np.linalg.norm(box[1] - box[0]))
     distance = float((np.maximum(FRAME_MARGIN * np.maximum(x, y), clearance) - depth).max())
     return _with(camera, middle - forward * distance, middle)

@@ -90,7 +90,8 @@ def diff(old: Scene, new: Scene) -> Change:
 def _without_equal_ends(
     old: tuple[Object, ...], new: tuple[Object, ...]
 ) -> tuple[tuple[Object, ...], tuple[Object, ...]]:
-    """Both without the objects that are the same from the first on and from the last on: nearly all."""
+    """Both without the objects that are the same from the first on and from the last on, which nearly all
+    are."""
 
     def same(a: Iterable[Object], b: Iterable[Object], most: int) -> int:
         return next(compress(count(), map(is_not, a, b)), most)
@@ -111,14 +112,14 @@ def affected_objects(old: Scene, new: Scene, change: Change) -> list[Object]:
 
 
 def _touched(scene: Scene, names: frozenset[str], materials: frozenset[str]) -> list[Object]:
-    if not materials:  # one among thousands
+    if not materials:  # Few objects may have changed among thousands, and are found by their names.
         chosen = (scene.objects[i] for i in sorted(scene.object_index[name] for name in names))
         return [obj for obj in chosen if obj.visible]
     return [o for o in scene.objects if o.visible and (o.name in names or o.material in materials)]
 
 
 def _look(scene: Scene, obj: Object) -> tuple[object, ...]:
-    # A mesh is itself only, see Mesh.
+    # Meshes are compared by identity, see Mesh.
     return id(obj.mesh), obj.transform, scene.materials[obj.material]
 
 

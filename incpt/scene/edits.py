@@ -27,10 +27,11 @@ from incpt.scene.transform import SMALLEST_SCALE, Transform
 Names = tuple[str, ...]
 
 DEFAULT_MATERIAL = "grey"
-"""What new objects are made of where nothing else is said; made when it is not there."""
+"""The material of new objects where nothing else is said. It is made when it is not there."""
 _SAME_ROTATION_DEG = 1e-4
+"""Angles that differ by less are the same: a gizmo's matrices are float32."""
 _RIGID = 1e-5
-"""What a gizmo's float32 matrices leave of equality: below it nothing was turned, or scaled."""
+"""Factors of matrices that differ by less are the same for that reason: nothing was turned, or scaled."""
 
 
 # ------------------------------------------------------------------------------------------ new objects

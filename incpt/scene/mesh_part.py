@@ -1,4 +1,4 @@
-"""What a mesh file gives: meshes with a name and a material."""
+"""What a mesh file gives, before it is put into a scene: meshes with a name and a material."""
 
 from __future__ import annotations
 
