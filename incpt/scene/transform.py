@@ -18,7 +18,7 @@ import numpy.typing as npt
 from incpt.core import affine
 from incpt.core.affine import Vector
 from incpt.core.errors import InputError
-from incpt.scene.checks import LARGEST, checked_number, set_vector
+from incpt.scene.checks import LARGEST, checked_number, read_only, set_vector
 
 Row = tuple[float, float, float, float]
 Rows = tuple[Row, Row, Row]
@@ -72,10 +72,10 @@ class Transform:
 
     @cached_property
     def world_from_object(self) -> npt.NDArray[np.float64]:
-        """(3, 4) affine matrix."""
+        """(3, 4) affine matrix, which cannot be written to."""
         if self.matrix is not None:
-            return np.array(self.matrix)
-        return affine.compose(self.position, self.rotation, self.scale)
+            return read_only(np.array(self.matrix))
+        return read_only(affine.compose(self.position, self.rotation, self.scale))
 
     def with_parts(
         self,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -397,19 +397,23 @@ vectors = st.tuples(numbers, numbers, numbers)
 fractions = st.floats(0, 1)
 radiances = st.tuples(*[st.floats(0, LARGEST)] * 3)
 names = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=12)
-materials_strategy = st.builds(
-    Material,
-    base_color=st.tuples(fractions, fractions, fractions),
-    metallic=fractions,
-    roughness=fractions,
-    specular=fractions,
-    ior=st.floats(1, 100),
-    transmission=fractions,
-    absorption=radiances,
-    priority=st.integers(0, 1000),
-    emission=radiances,
-    double_sided=st.booleans(),
-)
+MATERIAL_VALUES: dict[str, st.SearchStrategy[Any]] = {
+    "base_color": st.tuples(fractions, fractions, fractions),
+    "metallic": fractions,
+    "roughness": fractions,
+    "specular": fractions,
+    "ior": st.floats(1, 100),
+    "transmission": fractions,
+    "absorption": radiances,
+    "priority": st.integers(0, 1000),
+    "emission": radiances,
+    "double_sided": st.booleans(),
+}
+materials_strategy = st.builds(Material, **MATERIAL_VALUES)
+
+
+def test_files_are_tried_with_every_parameter_of_materials() -> None:
+    assert set(MATERIAL_VALUES) == {field.name for field in fields(Material)}
 
 
 @st.composite

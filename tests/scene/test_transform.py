@@ -165,6 +165,9 @@ def test_matrices_that_place_nothing_are_refused(matrix: Any, message: str) -> N
 def test_a_transform_does_not_change() -> None:
     with pytest.raises(FrozenInstanceError):
         IDENTITY.position = (1, 2, 3)  # type: ignore[misc]
+    for placed in (IDENTITY, Transform.from_matrix(SHEARED)):
+        with pytest.raises(ValueError, match="read-only"):
+            placed.world_from_object[0, 3] = 7
     with pytest.raises(InputError, match="flattens"):
         Transform(scale=(1, 0, 1))
     with pytest.raises(InputError, match="flattens"):

@@ -1,0 +1,28 @@
+"""Materials: every parameter is checked, and known to the kernels."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import pytest
+
+from incpt.core.errors import InputError
+from incpt.core.layout import MATERIAL
+from incpt.scene.material import Material
+
+NAMES = tuple(field.name for field in fields(Material))
+DERIVED = {"double_sided": "flags"}
+"""Parameters that kernels see in another form, and the field of the struct that holds it."""
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("value", ["much", None, float("nan"), -1.0, [1.0, 2.0]])
+def test_every_parameter_is_checked(name: str, value: Any) -> None:
+    with pytest.raises(InputError, match=f"^{name}: "):
+        Material(**{name: value})
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_parameter_reaches_the_kernels(name: str) -> None:
+    assert DERIVED.get(name, name) in (MATERIAL.names or ())
