@@ -47,12 +47,15 @@ class SceneTables:
         """One of the buffers: nodes, objects, materials, layers ... as it is now; see GeometryPool.buffer."""
         if name == "objects":
             return self.objects.buffer
-        for part in (self.top_level, self.materials, self.lights, self.environment):
-            if name in part.buffers:
-                return part.buffers[name]
-        return self.pool.buffer(name)
+        return self._own_buffers.get(name) or self.pool.buffer(name)
 
-    @property
+    @cached_property
+    def _own_buffers(self) -> Mapping[str, cl.Buffer]:
+        """Those that never change, since no other scene has a part in them."""
+        parts = (self.top_level, self.environment, self.lights, self.materials)
+        return {name: buffer for part in parts for name, buffer in part.buffers.items()}
+
+    @cached_property
     def features(self) -> tuple[str, ...]:
         """The preprocessor names that choose a variant of the shading kernels."""
         names = {"ENVIRONMENT_IMAGE": self._has_image_light, "TRIANGLE_LIGHTS": self.light_count > 0}
