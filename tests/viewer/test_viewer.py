@@ -12,6 +12,7 @@ import PIL.Image
 import pytest
 from support.small_scenes import mixed_scene
 
+from incpt.accel import bvh
 from incpt.core.errors import DeviceError, InputError
 from incpt.device.device import Device
 from incpt.render.modes import Mode
@@ -433,3 +434,23 @@ def test_reports_the_building_of_kernels(device: Device, monkeypatch: pytest.Mon
     Viewer(view_of(mixed_scene()), device, lambda done, total: seen.append((done, total)))
     total = seen[0][1]
     assert seen == [(done, total) for done in range(1, total + 1)] and total >= 10
+
+
+def test_the_sides_of_a_split_view_share_their_tables(
+    make_live: MakeLive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second side builds no tree, neither at first nor while something is dragged."""
+    trees: list[int] = []
+    build = bvh.build_boxes
+    monkeypatch.setattr(bvh, "build_boxes", lambda *args: (trees.append(args[1]), build(*args))[1])
+    scene = mixed_scene()
+    built = []
+    for split in (False, True):
+        live, _ = make_live(view_of(replace(scene), target_spp=2, split=split), speed=1.2e5)
+        trees.clear()
+        for x in (-0.5, -1.0):
+            view = view_of(moved(scene, x), before=scene, target_spp=2, split=split)
+            frames_until_rest(live, view)
+        built.append(len(trees))
+        del live
+    assert built[0] == built[1] > 0
