@@ -126,11 +126,12 @@ class Hand:
     def click(self, at: str | tuple[float, float], button: int = 1, times: int = 1) -> None:
         """A click on a widget or a place; `button` 1 left, 2 middle, 3 right."""
         self.move(self.middle(at) if isinstance(at, str) else at)
-        for _ in range(times):
-            _xdotool("mousedown", str(button))
-            self.pump(frames=1)
-            _xdotool("mouseup", str(button))
-            self.pump(frames=1)
+        for i in range(times):
+            with _patient_double_clicks(i > 0):
+                _xdotool("mousedown", str(button))
+                self.pump(frames=1)
+                _xdotool("mouseup", str(button))
+                self.pump(frames=1)
         self.pump(frames=3)
 
     def drag(
@@ -276,6 +277,21 @@ def _key_codes(keys: str) -> str:
         raise LookupError(f"no key {names[codes.index(0)]!r} on this keyboard")
     # Of three digits: one alone is the name of a key.
     return "+".join(f"{code:03d}" for code in codes)
+
+
+@contextmanager
+def _patient_double_clicks(on: bool) -> Iterator[None]:
+    """Meanwhile, where `on`, a second click may come late, as it does while frames take long."""
+    from imgui_bundle import imgui
+
+    io = imgui.get_io()
+    usual = io.mouse_double_click_time, io.mouse_single_click_delay
+    if on:
+        io.mouse_double_click_time, io.mouse_single_click_delay = _START_SECONDS, 2 * _START_SECONDS
+    try:
+        yield
+    finally:
+        io.mouse_double_click_time, io.mouse_single_click_delay = usual
 
 
 def _has_input() -> bool:
