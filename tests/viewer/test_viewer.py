@@ -437,7 +437,7 @@ def test_reports_the_building_of_kernels(device: Device, monkeypatch: pytest.Mon
 
 
 def test_the_sides_of_a_split_view_share_their_tables(
-    make_live: MakeLive, monkeypatch: pytest.MonkeyPatch
+    make_viewer: MakeViewer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The second side builds no tree, neither at first nor while something is dragged."""
     trees: list[int] = []
@@ -446,11 +446,11 @@ def test_the_sides_of_a_split_view_share_their_tables(
     scene = mixed_scene()
     built = []
     for split in (False, True):
-        live, _ = make_live(view_of(replace(scene), target_spp=2, split=split), speed=1.2e5)
+        viewer, _ = make_viewer(view_of(replace(scene), target_spp=2, split=split), speed=1.2e5)
         trees.clear()
         for x in (-0.5, -1.0):
             view = view_of(moved(scene, x), before=scene, target_spp=2, split=split)
-            frames_until_rest(live, view)
+            frames_until_rest(viewer, view)
         built.append(len(trees))
-        del live
+        del viewer
     assert built[0] == built[1] > 0
