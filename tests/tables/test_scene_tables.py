@@ -233,6 +233,38 @@ def test_tables_share_what_an_edit_leaves_alone(device: Device) -> None:
         assert {name for name in names if getattr(before, name) is not getattr(after, name)} == parts, kind
 
 
+def test_a_deformed_mesh_is_refitted(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its tree is not built anew, though the mesh is another one."""
+    scene = scene_of([placed("ball", 2)])
+    tables = tables_of(GeometryPool(device), scene)
+    monkeypatch.setattr("incpt.accel.bvh.build_mesh", None)
+    before = tables.meshes[scene.object("ball").mesh].built.tree
+    tables = tables_of(tables.pool, edited(scene, "deform", 0), tables)
+    (pooled,) = tables.meshes.values()
+    np.testing.assert_array_equal(pooled.built.tree.nodes["child"], before.nodes["child"])
+
+
+def test_a_black_image_is_no_light(device: Device) -> None:
+    black, shining = (
+        tables_of(GeometryPool(device), scene_of([]).with_environment(image=image)) for image in SKIES[1:]
+    )
+    assert "ENVIRONMENT_IMAGE" in shining.features and shining.environment_probability == 1.0
+    assert "ENVIRONMENT_IMAGE" not in black.features and black.environment_probability == 0.0
+    assert black.environment_radiance == (0.0, 0.0, 0.0)
+
+
+def test_beside_brute_force_the_tree_holds_the_other_objects(device: Device) -> None:
+    tables = tables_of(GeometryPool(device), scene_of([placed("cube", 0), placed("ball", 2)]))
+    assert "FEW_ON_TOP" in tables.variant and tables.has_trees
+    for name, has_packs in (("top_nodes", True), ("block_nodes", False)):
+        child = read(tables, name).view(layout.NODE)["child"]
+        leaves = child[(child >= layout.NODE_LEAF) & (child != layout.NODE_EMPTY)] & ~np.uint32(
+            layout.NODE_LEAF
+        )
+        assert 1 in leaves  # the ball
+        assert (leaves >= layout.NODE_PACK).any() == has_packs, name
+
+
 def test_objects_that_stay_are_not_described_again(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = scene_of(placed(f"{i}", i) for i in range(40))
     tables = tables_of(GeometryPool(device), scene)
