@@ -28,8 +28,7 @@ class Progress:
     queue     the tiles that the mode goes through, in order.
     cursor    how far the queue is done.
     tile_spp  (grid.count,) samples of the scene as it is now behind each tile; 0 where the film still shows
-    an
-              old picture, or none. See `Film` for the count that it keeps itself.
+              an old picture, or none. See `Film` for the count that it keeps itself.
     """
 
     settings: RenderSettings

@@ -56,9 +56,8 @@ class Situation:
     grid      the tiles of its picture.
     scene     the scene as it is now.
     tile_spp  (grid.count,) samples of that scene behind each tile.
-    film      what is in the film. To read its sums waits for the device; no strategy reads them in every
-    step. affected  the objects that a local change affects, as they were and as they are; in a drag, as they
-    were
+    film      what is in the film. To read its sums waits for the device, once for each queue.
+    affected  the objects that a local change affects, as they were and as they are; in a drag, as they were
               before the drag. Empty where no object changed.
     pixel     the point of change that came with the edit, (x, y) from the top left, or None.
     queue     the queue before this one; None at first.
@@ -84,9 +83,8 @@ class TracedStep:
     params   () layout.PARAMS they were traced with.
     plan     which tile and sample is in which slot.
     slots    the slots of the plan, on the device.
-    samples  the path buffer: what the paths brought, a plane for each channel of each pass of the film. The
-    tracer
-             fills those of radiance.
+    samples  the path buffer: what the paths brought, a plane for each channel of each pass of the film.
+             The tracer fills those of radiance.
     """
 
     tracer: Wavefront

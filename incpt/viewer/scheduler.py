@@ -62,13 +62,17 @@ class Side:
     divisor      what the resolution is divided by.
     full_view    the last view that it rendered at full resolution; None: there was none.
     changed_at   when the scene changed last; -inf where nobody waits for it to rest: at first, and after a
-    drag. is_answered  whether a finished tile has answered the last change, or a whole picture where it
-    started over. seconds      rendering time since the last change. nonfinite    samples since the last
-    change that were not finite. replaced     (grid.count,) the tiles that are finished since the last change.
-    version      goes up whenever the picture shows something new. urgent       the last version that is to be
-    shown at once. whole        how fast whole pictures were rendered. pass_paths   paths of the first pass
-    since the last change, and `pass_seconds` what they took. costs        what each tile took at full
-    resolution.
+                 drag.
+    is_answered  whether a finished tile has answered the last change, or, where the picture started over, a
+                 whole one.
+    seconds      rendering time since the last change.
+    nonfinite    samples since the last change that were not finite.
+    replaced     (grid.count,) the tiles that are finished since the last change.
+    version      goes up whenever the picture shows something new.
+    urgent       the last version that is to be shown at once.
+    whole        how fast whole pictures were rendered.
+    pass_paths   paths of the first pass since the last change, and `pass_seconds` what they took.
+    costs        what each tile took at full resolution.
     """
 
     view: View
