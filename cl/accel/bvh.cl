@@ -40,7 +40,7 @@ typedef struct {
     __global const Node *nodes;
     __global const TrianglePack *packs;
     __global const Object *objects;
-    __global const float *normals; // of the corners of faces, mesh by mesh; for `describe_path` alone
+    __global const float *normals; // of the corners of faces, mesh by mesh; for `setup_surface_path` alone
 } Geometry;
 
 // What the box test needs of a ray along one axis: distance to a plane = plane * inverse + shift, shifted so
@@ -177,9 +177,9 @@ INLINE float bvh_largest(Vec3 v) { return MAX(MAX(FABS(v.x), FABS(v.y)), FABS(v.
 INLINE Vec3 bvh_normal(Vec3 a, Vec3 b, Vec3 c) {
 #pragma OPENCL FP_CONTRACT OFF
     Vec3 ab = subtract(b, a), ac = subtract(c, a);
-    float scale = bvh_scale(MAX(bvh_largest(ab), bvh_largest(ac)));
-    ab = scaled(scale, ab);
-    ac = scaled(scale, ac);
+    float factor = bvh_scale(MAX(bvh_largest(ab), bvh_largest(ac)));
+    ab = scale(factor, ab);
+    ac = scale(factor, ac);
     return vec3(ab.y * ac.z - ab.z * ac.y, ab.z * ac.x - ab.x * ac.z, ab.x * ac.y - ab.y * ac.x);
 }
 

@@ -19,11 +19,11 @@ INLINE Frame frame_of(Vec3 n) {
 }
 
 INLINE Vec3 to_local(Frame f, Vec3 v) {
-    return vec3(inner(v, f.tangent), inner(v, f.bitangent), inner(v, f.normal));
+    return vec3(dot(v, f.tangent), dot(v, f.bitangent), dot(v, f.normal));
 }
 
 INLINE Vec3 from_local(Frame f, Vec3 v) {
-    return add(add(scaled(v.x, f.tangent), scaled(v.y, f.bitangent)), scaled(v.z, f.normal));
+    return add(add(scale(v.x, f.tangent), scale(v.y, f.bitangent)), scale(v.z, f.normal));
 }
 
 // Density cos / pi per solid angle.
@@ -37,13 +37,13 @@ INLINE Vec3 sample_cosine_hemisphere(float u, float v) {
 // A microfacet normal that is visible from wo (wo.z > 0) on a GGX surface, density G1(wo) D(h) <wo, h> /
 // wo.z. J. Dupuy and A. Benyoub, Sampling Visible GGX Normals with Spherical Caps, HPG 2023.
 INLINE Vec3 sample_visible_normal(Vec3 wo, float alpha, float u, float v) {
-    Vec3 stretched = unit(vec3(alpha * wo.x, alpha * wo.y, wo.z));
+    Vec3 stretched = normalize(vec3(alpha * wo.x, alpha * wo.y, wo.z));
     float sine, cosine;
     sincos_turns(u, &sine, &cosine);
     float z = (1.0f - v) * (1.0f + stretched.z) - stretched.z;
     float radius = SQRT(CLAMP(1.0f - z * z, 0.0f, 1.0f));
     Vec3 h = add(vec3(radius * cosine, radius * sine, z), stretched);
-    return unit(vec3(alpha * h.x, alpha * h.y, MAX(h.z, 1e-7f)));
+    return normalize(vec3(alpha * h.x, alpha * h.y, MAX(h.z, 1e-7f)));
 }
 
 // Barycentric coordinates of a point that is uniform on a triangle, for its second and third vertex.

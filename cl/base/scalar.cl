@@ -49,19 +49,31 @@ INLINE Vec3 vec3(float x, float y, float z) {
     return v;
 }
 
+// OpenCL has built-in functions of these names, which take its own vector types. Compilers differ in whether
+// a program may add an overload for a struct, so macros lead the calls to functions of other names. PoCL has
+// macros of these names too.
+#undef cross
+#undef dot
+#undef normalize
+#undef select
+#define cross(a, b) vec3_cross(a, b)
+#define dot(a, b) vec3_dot(a, b)
+#define normalize(a) vec3_normalize(a)
+#define select(condition, a, b) vec3_select(condition, a, b) // `a` where the condition holds, as in ?:
+
 INLINE Vec3 add(Vec3 a, Vec3 b) { return vec3(a.x + b.x, a.y + b.y, a.z + b.z); }
 INLINE Vec3 subtract(Vec3 a, Vec3 b) { return vec3(a.x - b.x, a.y - b.y, a.z - b.z); }
-INLINE Vec3 times(Vec3 a, Vec3 b) { return vec3(a.x * b.x, a.y * b.y, a.z * b.z); }
-INLINE Vec3 scaled(float s, Vec3 a) { return vec3(s * a.x, s * a.y, s * a.z); }
-INLINE Vec3 along(Vec3 origin, float t, Vec3 direction) { return add(origin, scaled(t, direction)); }
-INLINE Vec3 choose(int condition, Vec3 a, Vec3 b) {
+INLINE Vec3 mul(Vec3 a, Vec3 b) { return vec3(a.x * b.x, a.y * b.y, a.z * b.z); }
+INLINE Vec3 scale(float s, Vec3 a) { return vec3(s * a.x, s * a.y, s * a.z); }
+INLINE Vec3 along(Vec3 origin, float t, Vec3 direction) { return add(origin, scale(t, direction)); }
+INLINE Vec3 vec3_select(int condition, Vec3 a, Vec3 b) {
     return vec3(condition ? a.x : b.x, condition ? a.y : b.y, condition ? a.z : b.z);
 }
-INLINE float inner(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-INLINE Vec3 outer(Vec3 a, Vec3 b) {
+INLINE float vec3_dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+INLINE Vec3 vec3_cross(Vec3 a, Vec3 b) {
     return vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
 }
-INLINE Vec3 unit(Vec3 a) { return scaled(1.0f / SQRT(inner(a, a)), a); }
+INLINE Vec3 vec3_normalize(Vec3 a) { return scale(1.0f / SQRT(dot(a, a)), a); }
 INLINE float largest(Vec3 a) { return MAX(MAX(a.x, a.y), a.z); }
 INLINE float luminance(Vec3 c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
 

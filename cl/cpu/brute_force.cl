@@ -11,23 +11,23 @@
 // through between it and its neighbours.
 
 // Planes of what the sweep finds.
-#define SWEEP_DISTANCE 0
-#define SWEEP_WEIGHT 1
-#define SWEEP_PLACE 4 // of the facet, or SWEEP_SIDE and more
+#define FOUND_DISTANCE 0
+#define FOUND_WEIGHT 1
+#define FOUND_PLACE 4 // of the facet, or FOUND_SIDE and more
 
 // A place with this bit is that of the first of two opposite sides of a parallelepiped, and the weights are
-// local coordinates. Above SWEEP_AXIS stands the axis along which they are opposite.
-#define SWEEP_SIDE 0x80000000u
-#define SWEEP_AXIS 29
+// local coordinates. Above FOUND_AXIS_SHIFT stands the axis along which they are opposite.
+#define FOUND_SIDE 0x80000000u
+#define FOUND_AXIS_SHIFT 29
 
 typedef struct {
-    __global const Facet *facets;
-    __global const Solid *solids;
+    __global const Quad *quads;
+    __global const Parallelepiped *parallelepipeds;
     __global const Cluster *clusters;
     uint cluster_count; // at most 32, of which rays meet the last without asking for its box
-} Sweep;
+} BruteForce;
 
-INLINE bool sweep_any(const int16 comparison) {
+INLINE bool any_lane(const int16 comparison) {
 #ifdef __AVX512DQ__
     return __builtin_ia32_cvtd2mask512(comparison) != 0;
 #else
@@ -37,8 +37,8 @@ INLINE bool sweep_any(const int16 comparison) {
 
 // Which rays meet a box between 0 and their limit, to be on the safe side; as bvh_boxes tells it of many
 // boxes and one ray. `inverse` and the shifts are those of bvh_slab, in the axes of the rays.
-INLINE int16 sweep_box(__global const float *bounds, const uint *axes, const float16 *inverse,
-                       const float16 *near_shift, const float16 *far_shift, float16 limit) {
+INLINE int16 lanes_meet_box(__global const float *bounds, const uint *axes, const float16 *inverse,
+                            const float16 *near_shift, const float16 *far_shift, float16 limit) {
     float16 near = 0.0f, far = limit;
 #pragma unroll
     for (uint i = 0; i < 3; i++) {
@@ -54,17 +54,17 @@ typedef struct {
     float16 origin[3], direction[3], shear[3];
     float16 limit, weight[3];
     uint16 place;
-} SweepGroup;
+} RayGroup;
 
 // Tests the rays against a parallelogram, or a triangle. Of both the weights of the corners A, B and C are
 // kept: in the other half of a parallelogram that of B is negative. With `any`, that something is met is
 // kept.
-INLINE void sweep_facet(SweepGroup *group, __global const Facet *facet, uint index, const uint *axes,
-                        const bool triangle, const bool any) {
+INLINE void test_quad(RayGroup *group, __global const Quad *quad, uint index, const uint *axes,
+                      const bool triangle, const bool any) {
     LaneCorner corner[4];
 #pragma unroll
     for (uint i = 0; i < (triangle ? 3 : 4); i++) {
-        __global const float *vertex = facet->vertex + 3 * i;
+        __global const float *vertex = quad->vertex + 3 * i;
         corner[i] =
             lane_corner(vertex[axes[0]], vertex[axes[1]], vertex[axes[2]], group->origin, group->shear);
     }
@@ -90,14 +90,15 @@ INLINE void sweep_facet(SweepGroup *group, __global const Facet *facet, uint ind
 
 // Tests the rays against a parallelepiped, as against a box with slabs (Kay and Kajiya 1986) in its own
 // coordinates. Rays that start inside meet the side where they leave.
-INLINE void sweep_solid(SweepGroup *group, __global const Solid *solid, const uint *axes, const bool any) {
+INLINE void test_parallelepiped(RayGroup *group, __global const Parallelepiped *parallelepiped,
+                                const uint *axes, const bool any) {
     float16 away[3], start[3], step[3], entry[3], exit[3];
 #pragma unroll
     for (uint i = 0; i < 3; i++)
-        away[i] = group->origin[i] - solid->corner[axes[i]];
+        away[i] = group->origin[i] - parallelepiped->corner[axes[i]];
 #pragma unroll
     for (uint k = 0; k < 3; k++) {
-        __global const float *row = solid->local_from_world + 3 * k;
+        __global const float *row = parallelepiped->local_from_world + 3 * k;
         start[k] = row[axes[0]] * away[0] + row[axes[1]] * away[1] + row[axes[2]] * away[2];
         step[k] = row[axes[0]] * group->direction[0] + row[axes[1]] * group->direction[1] +
                   row[axes[2]] * group->direction[2];
@@ -118,9 +119,9 @@ INLINE void sweep_solid(SweepGroup *group, __global const Solid *solid, const ui
     }
     const int16 on_first = (inside ? exit[0] : entry[0]) == distance;
     const int16 on_second = (inside ? exit[1] : entry[1]) == distance;
-    const uint base = solid->first_side | SWEEP_SIDE;
-    uint16 place =
-        on_second ? (uint16)(base + 2u + (1u << SWEEP_AXIS)) : (uint16)(base + 4u + (2u << SWEEP_AXIS));
+    const uint base = parallelepiped->first_side | FOUND_SIDE;
+    uint16 place = on_second ? (uint16)(base + 2u + (1u << FOUND_AXIS_SHIFT))
+                             : (uint16)(base + 4u + (2u << FOUND_AXIS_SHIFT));
     place = on_first ? (uint16)(base) : place;
     group->place = met ? place : group->place;
 #pragma unroll
@@ -130,7 +131,7 @@ INLINE void sweep_solid(SweepGroup *group, __global const Solid *solid, const ui
 }
 
 // The clusters, a bit for each, whose boxes some ray of the group meets, and the last.
-INLINE uint sweep_clusters(const Sweep *sweep, const SweepGroup *group, const uint *axes) {
+INLINE uint clusters_met(const BruteForce *brute_force, const RayGroup *group, const uint *axes) {
     float16 inverse[3], near_shift[3], far_shift[3];
 #pragma unroll
     for (uint i = 0; i < 3; i++) {
@@ -148,11 +149,11 @@ INLINE uint sweep_clusters(const Sweep *sweep, const SweepGroup *group, const ui
         near_shift[i] = shift - slack;
         far_shift[i] = shift + slack;
     }
-    const uint last = sweep->cluster_count - 1;
+    const uint last = brute_force->cluster_count - 1;
     uint met = 1u << last;
     for (uint i = 0; i < last; i++)
-        met |= (uint)sweep_any(
-                   sweep_box(sweep->clusters[i].bounds, axes, inverse, near_shift, far_shift, group->limit))
+        met |= (uint)any_lane(lanes_meet_box(brute_force->clusters[i].bounds, axes, inverse, near_shift,
+                                             far_shift, group->limit))
                << i;
     return met;
 }
@@ -160,10 +161,10 @@ INLINE uint sweep_clusters(const Sweep *sweep, const SweepGroup *group, const ui
 // Tests sixteen rays against all facets; `axis` is the largest of their directions. `rays` are planes of
 // origins, directions and, with `any`, how far the rays look; what is found comes into the planes `found`,
 // with `any` that something is met alone.
-INLINE void sweep_group(const Sweep *sweep, __local const float *rays, uint axis, const bool any,
-                        __local float *found) {
+INLINE void brute_force_group(const BruteForce *brute_force, __local const float *rays, uint axis,
+                              const bool any, __local float *found) {
     const uint axes[3] = {bvh_x_axis(axis), bvh_y_axis(axis), axis};
-    SweepGroup group;
+    RayGroup group;
     group.shear[2] = 1.0f / load_lanes(rays + (3 + axis) * BLOCK_STRIDE);
 #pragma unroll
     for (uint i = 0; i < 3; i++) {
@@ -175,37 +176,39 @@ INLINE void sweep_group(const Sweep *sweep, __local const float *rays, uint axis
     }
     group.limit = any ? load_lanes(rays + 6 * BLOCK_STRIDE) : INFINITY;
     group.place = NO_INDEX;
-    for (uint waiting = sweep_clusters(sweep, &group, axes); waiting; waiting &= waiting - 1) {
-        __global const Cluster *cluster = sweep->clusters + BVH_FIRST_BIT(waiting);
-        for (uint i = cluster->first_solid; i < cluster->solid_end; i++)
-            sweep_solid(&group, sweep->solids + i, axes, any);
+    for (uint waiting = clusters_met(brute_force, &group, axes); waiting; waiting &= waiting - 1) {
+        __global const Cluster *cluster = brute_force->clusters + BVH_FIRST_BIT(waiting);
+        for (uint i = cluster->first_parallelepiped; i < cluster->parallelepiped_end; i++)
+            test_parallelepiped(&group, brute_force->parallelepipeds + i, axes, any);
         uint i = cluster->first;
         for (; i < cluster->first_triangle; i++)
-            sweep_facet(&group, sweep->facets + i, i, axes, false, any);
+            test_quad(&group, brute_force->quads + i, i, axes, false, any);
         for (; i < cluster->end; i++)
-            sweep_facet(&group, sweep->facets + i, i, axes, true, any);
+            test_quad(&group, brute_force->quads + i, i, axes, true, any);
     }
-    store_lanes(found + SWEEP_PLACE * BLOCK_STRIDE, as_float16(group.place));
+    store_lanes(found + FOUND_PLACE * BLOCK_STRIDE, as_float16(group.place));
     if (any)
         return;
-    store_lanes(found + SWEEP_DISTANCE * BLOCK_STRIDE, group.limit);
+    store_lanes(found + FOUND_DISTANCE * BLOCK_STRIDE, group.limit);
 #pragma unroll
     for (uint i = 0; i < 3; i++)
-        store_lanes(found + (SWEEP_WEIGHT + i) * BLOCK_STRIDE, group.weight[i]);
+        store_lanes(found + (FOUND_WEIGHT + i) * BLOCK_STRIDE, group.weight[i]);
 }
 
 // Up to fifteen more rays than `count` are read, and their places in `found` written: in the planes of a
 // block there is room for them.
-static __attribute__((noinline)) WIDE void sweep_rays(const Sweep *sweep, __local const float *rays,
-                                                      uint axis, uint count, __local float *found) {
+static __attribute__((noinline)) WIDE void brute_force_nearest(const BruteForce *brute_force,
+                                                               __local const float *rays, uint axis,
+                                                               uint count, __local float *found) {
     for (uint first = 0; first < count; first += LANE_COUNT)
-        sweep_group(sweep, rays + first, axis, false, found + first);
+        brute_force_group(brute_force, rays + first, axis, false, found + first);
 }
 
 #ifdef LIGHT_SAMPLING
-static __attribute__((noinline)) WIDE void sweep_any_rays(const Sweep *sweep, __local const float *rays,
-                                                          uint axis, uint count, __local float *found) {
+static __attribute__((noinline)) WIDE void brute_force_any(const BruteForce *brute_force,
+                                                           __local const float *rays, uint axis, uint count,
+                                                           __local float *found) {
     for (uint first = 0; first < count; first += LANE_COUNT)
-        sweep_group(sweep, rays + first, axis, true, found + first);
+        brute_force_group(brute_force, rays + first, axis, true, found + first);
 }
 #endif

@@ -13,7 +13,7 @@
 #define PACKETS
 #endif
 
-#if defined(PACKETS) && !defined(ALL_SWEPT)
+#if defined(PACKETS) && !defined(BRUTE_FORCE_ONLY)
 // A pack is tested in the lanes from so many rays on.
 #define PACKET_MANY 11u
 
@@ -39,8 +39,9 @@ typedef struct {
     float16 limit, weight[3]; // of the nearest hits so far
     uint16 triangle, object;
     uint height;
-    uint reference[FLIGHT_STACK_SIZE];
-    float16 near[FLIGHT_STACK_SIZE]; // where each ray enters the box of that reference, infinity: nowhere
+    uint reference[INTERLEAVED_STACK_SIZE];
+    float16
+        near[INTERLEAVED_STACK_SIZE]; // where each ray enters the box of that reference, infinity: nowhere
 } Packet;
 
 INLINE uint packet_lanes(const int16 comparison) { return (ushort)__builtin_ia32_cvtd2mask512(comparison); }
@@ -86,7 +87,7 @@ INLINE bool packet_prepare(PacketRays *rays, const float16 *origin, const float1
 }
 
 // Pushes the children of a node that any ray meets.
-INLINE void packet_through_node(Packet *packet, const PacketPlace *place, uint reference) {
+INLINE void packet_test_node(Packet *packet, const PacketPlace *place, uint reference) {
     const PacketRays *rays = &packet->rays;
     __global const Node *node = place->nodes + reference;
     const uint order = node->order[rays->octant];
@@ -117,7 +118,7 @@ INLINE void packet_through_node(Packet *packet, const PacketPlace *place, uint r
 }
 
 // Tests each of the rays in `lanes` against eight triangles at a time.
-INLINE void packet_few_through_pack(Packet *packet, const PacketPlace *place, uint index, uint lanes) {
+INLINE void packet_test_pack_by_ray(Packet *packet, const PacketPlace *place, uint index, uint lanes) {
     const PacketRays *rays = &packet->rays;
     __global const TrianglePack *pack = place->packs + index;
     BvhRay ray;
@@ -148,7 +149,7 @@ INLINE void packet_few_through_pack(Packet *packet, const PacketPlace *place, ui
 }
 
 // Tests all rays against one triangle of a pack after the other.
-INLINE void packet_through_pack(Packet *packet, const PacketPlace *place, uint index) {
+INLINE void packet_test_pack(Packet *packet, const PacketPlace *place, uint index) {
     const PacketRays *rays = &packet->rays;
     __global const TrianglePack *pack = place->packs + index;
     const uint axes[3] = {bvh_x_axis(rays->main), bvh_y_axis(rays->main), rays->main};
@@ -180,9 +181,9 @@ INLINE PacketPlace packet_world(const Geometry *geometry) {
     return place;
 }
 
-#ifndef ALL_ON_TOP
-INLINE bool packet_into_object(Packet *packet, PacketPlace *place, const Geometry *geometry,
-                               const float16 *origin, const float16 *direction, uint index) {
+#ifndef TOP_LEVEL_ONLY
+INLINE bool packet_enter_object(Packet *packet, PacketPlace *place, const Geometry *geometry,
+                                const float16 *origin, const float16 *direction, uint index) {
     __global const Object *object = geometry->objects + index;
     if (!object->visible)
         return true;
@@ -198,7 +199,7 @@ INLINE bool packet_into_object(Packet *packet, PacketPlace *place, const Geometr
     place->nodes = geometry->nodes + object->first_node;
     place->packs = geometry->packs + object->first_pack;
     place->first_triangle = object->first_pack * BVH_WIDTH;
-    packet_push(packet, FLIGHT_LEAVES);
+    packet_push(packet, LEAVE_OBJECT);
     packet_push(packet, 0);
     return packet_prepare(&packet->rays, p, d);
 }
@@ -223,8 +224,8 @@ INLINE bool packet_trace(Packet *packet, const Geometry *geometry, STATE const f
         packet->height--;
         const uint lanes = packet_lanes(packet->near[packet->height] <= packet->limit);
         const uint reference = packet->reference[packet->height];
-#ifndef ALL_ON_TOP
-        if (reference == FLIGHT_LEAVES) {
+#ifndef TOP_LEVEL_ONLY
+        if (reference == LEAVE_OBJECT) {
             packet->rays = packet->world;
             place = packet_world(geometry);
             continue;
@@ -233,59 +234,59 @@ INLINE bool packet_trace(Packet *packet, const Geometry *geometry, STATE const f
         if (!lanes)
             continue;
         if (!(reference & NODE_LEAF)) {
-            packet_through_node(packet, &place, reference);
+            packet_test_node(packet, &place, reference);
             continue;
         }
-#ifndef ALL_ON_TOP
+#ifndef TOP_LEVEL_ONLY
         if (place.object == NO_INDEX && !(reference & NODE_PACK)) {
-            if (!packet_into_object(packet, &place, geometry, origin, direction, reference & ~NODE_LEAF))
+            if (!packet_enter_object(packet, &place, geometry, origin, direction, reference & ~NODE_LEAF))
                 return false;
             continue;
         }
 #endif
         const uint pack = reference & ~(NODE_LEAF | NODE_PACK);
         if (BVH_COUNT_BITS(lanes) < PACKET_MANY)
-            packet_few_through_pack(packet, &place, pack, lanes);
+            packet_test_pack_by_ray(packet, &place, pack, lanes);
         else
-            packet_through_pack(packet, &place, pack);
+            packet_test_pack(packet, &place, pack);
     }
     return true;
 }
 
-INLINE void packet_keep_plane(STATE float *plane, int16 met, float16 value) {
+INLINE void packet_store_plane(STATE float *plane, int16 met, float16 value) {
     store_lanes(plane, met ? value : load_lanes(plane));
 }
 
-// As flight_keep.
-INLINE void packet_keep(const Packet *packet, const State *state, uint path) {
+// As interleaved_store_hit.
+INLINE void packet_store_hit(const Packet *packet, const State *state, uint path) {
     STATE float *hits = state->hits + path;
-#ifdef FEW_ON_TOP
+#ifdef BRUTE_FORCE
     const int16 met = packet->object != NO_INDEX;
 #else
     const int16 met = -1;
 #endif
-    packet_keep_plane(hits + HIT_DISTANCE * BLOCK_STRIDE, met, packet->limit);
-    packet_keep_plane(hits + HIT_OBJECT * BLOCK_STRIDE, met, as_float16(packet->object));
-    packet_keep_plane(hits + HIT_TRIANGLE * BLOCK_STRIDE, met, as_float16(packet->triangle));
+    packet_store_plane(hits + HIT_DISTANCE * BLOCK_STRIDE, met, packet->limit);
+    packet_store_plane(hits + HIT_OBJECT * BLOCK_STRIDE, met, as_float16(packet->object));
+    packet_store_plane(hits + HIT_TRIANGLE * BLOCK_STRIDE, met, as_float16(packet->triangle));
 #pragma unroll
     for (uint i = 0; i < 3; i++)
-        packet_keep_plane(hits + (HIT_POSITION_X + i) * BLOCK_STRIDE, met, packet->weight[i]);
+        packet_store_plane(hits + (HIT_POSITION_X + i) * BLOCK_STRIDE, met, packet->weight[i]);
 }
 
 // The nearest hits of `count` rays as far as those of sixteen neighbours keep together. The others come to
 // stand in `list`, in order; returns how many they are.
-static __attribute__((noinline)) WIDE uint packets_to_nearest(const Geometry *geometry, const State *state,
-                                                              __local uint *list, uint count) {
+static __attribute__((noinline)) WIDE uint packet_nearest(const Geometry *geometry, const State *state,
+                                                          __local uint *list, uint count) {
     Packet packet;
     uint left = 0, first = 0;
     for (; first + LANE_COUNT <= count; first += LANE_COUNT) {
-#ifdef FEW_ON_TOP
+#ifdef BRUTE_FORCE
         packet.limit = load_lanes(state->hits + HIT_DISTANCE * BLOCK_STRIDE + first);
 #else
         packet.limit = INFINITY;
 #endif
         if (packet_trace(&packet, geometry, state->rays + first)) {
-            packet_keep(&packet, state, first);
+            packet_store_hit(&packet, state, first);
             continue;
         }
         for (uint i = 0; i < LANE_COUNT; i++)

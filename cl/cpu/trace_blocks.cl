@@ -7,8 +7,8 @@
 // which follow go over neighbours.
 
 #define BLOCKS
-#if defined(FEW_ON_TOP) && defined(ALL_ON_TOP)
-#define ALL_SWEPT
+#if defined(BRUTE_FORCE) && defined(TOP_LEVEL_ONLY)
+#define BRUTE_FORCE_ONLY
 #endif
 #include "path/setup_surface.cl"
 #include "path/shade_miss.cl"
@@ -44,7 +44,7 @@ typedef struct {
     Geometry geometry;
     Emitters emitters;
     __global const float *layers;
-    Sweep sweep;
+    BruteForce brute_force;
     State state;
     __local float *own_rays; // where rays and paths lie, but while rays are traced
     __local float *own_paths;
@@ -74,19 +74,20 @@ STAGE void start_paths(const Block *block, uint first, uint count) {
     }
 }
 
-#ifdef FEW_ON_TOP
+#ifdef BRUTE_FORCE
 #define LIVE_KINDS 3 // by the largest component of the direction
 #else
 #define LIVE_KINDS 1
 #endif
 
 // Which of `count` paths have a bit in their class, by the kinds of their rays; in the lanes.
-STAGE void pick_rays(const Block *block, __local const float *rays, uint wanted, uint count, Picked *kinds) {
+STAGE void subsets_by_axis(const Block *block, __local const float *rays, uint wanted, uint count,
+                           Subset *kinds) {
     __local uint *keys = (__local uint *)block->spare;
     LANES
     for (int i = 0; i < (int)count; i++) {
         uint meant = (load_bits(block->state.paths, PATH_CLASS * BLOCK_STRIDE + i) & wanted) != 0u;
-#ifdef FEW_ON_TOP
+#ifdef BRUTE_FORCE
         uint kind = bvh_main_axis(load3(rays + 3 * BLOCK_STRIDE, BLOCK_STRIDE, i));
 #else
         uint kind = 0u;
@@ -94,13 +95,13 @@ STAGE void pick_rays(const Block *block, __local const float *rays, uint wanted,
         keys[i] = meant ? kind : NO_INDEX;
     }
     for (uint kind = 0; kind < LIVE_KINDS; kind++)
-        kinds[kind] = pick(keys, kind, count, block->rows + kind * BLOCK_STRIDE);
+        kinds[kind] = subset_where(keys, kind, count, block->rows + kind * BLOCK_STRIDE);
 }
 
 // Moves the live ones of `count` paths to where they are traced, kind after kind; returns how many they are.
-STAGE uint gather_live(Block *block, uint count, Picked *kinds) {
+STAGE uint compact_live(Block *block, uint count, Subset *kinds) {
     State *state = &block->state;
-    pick_rays(block, state->rays, CLASS_LIVE, count, kinds);
+    subsets_by_axis(block, state->rays, CLASS_LIVE, count, kinds);
     for (uint kind = 0; kind < LIVE_KINDS; kind++)
         if (kinds[kind].count == count)
             return count; // they are there already
@@ -108,16 +109,16 @@ STAGE uint gather_live(Block *block, uint count, Picked *kinds) {
     uint live = 0;
     for (uint kind = 0; kind < LIVE_KINDS; kind++) {
         for (uint p = 0; p < RAY_PLANES; p++)
-            move_plane(rays + p * BLOCK_STRIDE + live, state->rays + p * BLOCK_STRIDE, &kinds[kind]);
+            compact_plane(rays + p * BLOCK_STRIDE + live, state->rays + p * BLOCK_STRIDE, &kinds[kind]);
         for (uint p = 0; p <= LAST_CARRIED; p++)
-            move_plane(paths + p * BLOCK_STRIDE + live, state->paths + p * BLOCK_STRIDE, &kinds[kind]);
+            compact_plane(paths + p * BLOCK_STRIDE + live, state->paths + p * BLOCK_STRIDE, &kinds[kind]);
         live += kinds[kind].count;
     }
     place_paths(block, rays, paths);
     return live;
 }
 
-#ifdef FEW_ON_TOP
+#ifdef BRUTE_FORCE
 // Weights of the corners A, B and C of a side of a parallelepiped; `at`: local coordinates.
 INLINE Vec3 side_weights(uint turns, Vec3 at) {
     uint along = turns >> 4;
@@ -129,86 +130,88 @@ INLINE Vec3 side_weights(uint turns, Vec3 at) {
 
 // Of a parallelogram ABCD the sweep leaves the weights of A, B and C, where that of B is against the others
 // in the half ACD: as B is A + C - D, those of A, C and D follow.
-INLINE void keep_swept(const Sweep *sweep, const State *state, __local const float *found, uint path) {
-    uint place = load_bits(found, SWEEP_PLACE * BLOCK_STRIDE + path);
-    Vec3 weight = load3(found + SWEEP_WEIGHT * BLOCK_STRIDE, BLOCK_STRIDE, path);
+INLINE void store_brute_force_hit(const BruteForce *brute_force, const State *state,
+                                  __local const float *found, uint path) {
+    uint place = load_bits(found, FOUND_PLACE * BLOCK_STRIDE + path);
+    Vec3 weight = load3(found + FOUND_WEIGHT * BLOCK_STRIDE, BLOCK_STRIDE, path);
     int met = place != NO_INDEX;
-    int side = met & ((place & SWEEP_SIDE) != 0u);
-    uint index = side ? place & ((1u << SWEEP_AXIS) - 1u) : met ? place : 0u;
-    int opposite = side & (bvh_component(weight, place >> SWEEP_AXIS & 3u) > 0.5f);
+    int side = met & ((place & FOUND_SIDE) != 0u);
+    uint index = side ? place & ((1u << FOUND_AXIS_SHIFT) - 1u) : met ? place : 0u;
+    int opposite = side & (bvh_component(weight, place >> FOUND_AXIS_SHIFT & 3u) > 0.5f);
     index += opposite ? 1u : 0u;
-    __global const Facet *facet = sweep->facets + index;
-    uint turns = facet->turns;
-    weight = choose(side, side_weights(turns, weight), weight);
+    __global const Quad *quad = brute_force->quads + index;
+    uint turns = quad->turns;
+    weight = select(side, side_weights(turns, weight), weight);
     float others = weight.x + weight.z;
     int second = ((weight.y < 0.0f) & (others > 0.0f)) | ((weight.y > 0.0f) & (others < 0.0f));
-    weight = choose(second, vec3(weight.x + weight.y, weight.z + weight.y, -weight.y), weight);
-    uint triangle = second ? facet->place[1] : facet->place[0];
+    weight = select(second, vec3(weight.x + weight.y, weight.z + weight.y, -weight.y), weight);
+    uint triangle = second ? quad->place[1] : quad->place[0];
     uint corner = (second ? turns >> 2 : turns) & 3u;
-    state->hits[HIT_DISTANCE * BLOCK_STRIDE + path] = found[SWEEP_DISTANCE * BLOCK_STRIDE + path];
-    store_bits(state->hits, HIT_OBJECT * BLOCK_STRIDE + path, met ? facet->object : NO_INDEX);
+    state->hits[HIT_DISTANCE * BLOCK_STRIDE + path] = found[FOUND_DISTANCE * BLOCK_STRIDE + path];
+    store_bits(state->hits, HIT_OBJECT * BLOCK_STRIDE + path, met ? quad->object : NO_INDEX);
     store_bits(state->hits, HIT_TRIANGLE * BLOCK_STRIDE + path, met ? triangle : NO_INDEX);
-    Vec3 turned = choose(corner == 1u, vec3(weight.z, weight.x, weight.y), weight);
-    turned = choose(corner == 2u, vec3(weight.y, weight.z, weight.x), turned);
+    Vec3 turned = select(corner == 1u, vec3(weight.z, weight.x, weight.y), weight);
+    turned = select(corner == 2u, vec3(weight.y, weight.z, weight.x), turned);
     store3(state->hits + HIT_POSITION_X * BLOCK_STRIDE, BLOCK_STRIDE, path, turned);
 }
 
 // What the rays of `count` paths meet of the top level.
-STAGE void sweep_nearest(const Block *block, uint count, const Picked *kinds) {
+STAGE void trace_brute_force(const Block *block, uint count, const Subset *kinds) {
     uint first = 0;
     for (uint axis = 0; axis < 3; axis++) {
-        sweep_rays(&block->sweep, block->state.rays + first, axis, kinds[axis].count, block->spare + first);
+        brute_force_nearest(&block->brute_force, block->state.rays + first, axis, kinds[axis].count,
+                            block->spare + first);
         first += kinds[axis].count;
     }
     LANES
     for (int i = 0; i < (int)count; i++)
-        keep_swept(&block->sweep, &block->state, block->spare, i);
+        store_brute_force_hit(&block->brute_force, &block->state, block->spare, i);
 }
 #endif
 
-#ifndef ALL_SWEPT
-// Makes the rays in these planes ready for `fly_to_nearest` and `fly_to_lights`.
-STAGE void prepare_flights(const Block *block, __local const float *rays, uint count) {
+#ifndef BRUTE_FORCE_ONLY
+// Makes the rays in these planes ready for `interleaved_nearest` and `interleaved_any`.
+STAGE void prepare_rays(const Block *block, __local const float *rays, uint count) {
     LANES
     for (int i = 0; i < (int)count; i++)
-        flight_prepare(block->spare, rays, i);
+        prepare_ray(block->spare, rays, i);
 }
 #endif
 
 // Traces the rays of the live ones of `count` paths; returns how many they are. They come to stand in front.
 // `from_camera` tells whether neighbours go much the same way.
 STAGE uint trace_rays(Block *block, uint count, bool from_camera) {
-    Picked kinds[LIVE_KINDS];
-    const uint live = gather_live(block, count, kinds);
-#ifdef FEW_ON_TOP
-    sweep_nearest(block, live, kinds);
+    Subset kinds[LIVE_KINDS];
+    const uint live = compact_live(block, count, kinds);
+#ifdef BRUTE_FORCE
+    trace_brute_force(block, live, kinds);
 #endif
-#ifndef ALL_SWEPT
+#ifndef BRUTE_FORCE_ONLY
     uint listed = live;
 #ifdef PACKETS
     if (from_camera)
-        listed = packets_to_nearest(&block->geometry, &block->state, block->list, live);
+        listed = packet_nearest(&block->geometry, &block->state, block->list, live);
     else
 #endif
         for (uint i = 0; i < live; i++)
             block->list[i] = i;
     if (listed > 0)
-        prepare_flights(block, block->state.rays, live);
-    fly_to_nearest(&block->geometry, &block->state, block->spare, block->list, listed);
+        prepare_rays(block, block->state.rays, live);
+    interleaved_nearest(&block->geometry, &block->state, block->spare, block->list, listed);
 #endif
     return live;
 }
 
 // What rays have led paths to.
 typedef struct {
-    Picked escaped, surfaces, media;
-} Ends;
+    Subset misses, surfaces, media;
+} RayEnds;
 
-#define KEY_ESCAPED 0
+#define KEY_MISS 0
 #define KEY_SURFACE 1
 #define KEY_MEDIUM 2
 
-STAGE void tell_apart(const Block *block, uint count, Ends *ends) {
+STAGE void sort_by_ends(const Block *block, uint count, RayEnds *ends) {
     __local uint *keys = (__local uint *)block->spare;
     LANES
     for (int i = 0; i < (int)count; i++) {
@@ -216,32 +219,33 @@ STAGE void tell_apart(const Block *block, uint count, Ends *ends) {
 #ifdef MEDIA
         uint medium =
             surface_class(&block->geometry, block->emitters.materials, &block->state, i) == CLASS_MEDIUM;
-        keys[i] = hit ? (medium ? KEY_MEDIUM : KEY_SURFACE) : KEY_ESCAPED;
+        keys[i] = hit ? (medium ? KEY_MEDIUM : KEY_SURFACE) : KEY_MISS;
 #else
-        keys[i] = hit ? KEY_SURFACE : KEY_ESCAPED;
+        keys[i] = hit ? KEY_SURFACE : KEY_MISS;
 #endif
     }
-    ends->escaped = pick(keys, KEY_ESCAPED, count, block->rows);
-    ends->surfaces = pick(keys, KEY_SURFACE, count, block->rows + BLOCK_STRIDE);
+    ends->misses = subset_where(keys, KEY_MISS, count, block->rows);
+    ends->surfaces = subset_where(keys, KEY_SURFACE, count, block->rows + BLOCK_STRIDE);
 #ifdef MEDIA
-    ends->media = pick(keys, KEY_MEDIUM, count, block->rows + 2 * BLOCK_STRIDE);
+    ends->media = subset_where(keys, KEY_MEDIUM, count, block->rows + 2 * BLOCK_STRIDE);
 #endif
 }
 
-STAGE void escape_paths(const Block *block, const Picked *escaped) {
-    list_picked(block->list, escaped, 0);
+STAGE void shade_misses(const Block *block, const Subset *misses) {
+    list_subset(block->list, misses, 0);
     LANES
-    for (int i = 0; i < (int)escaped->count; i++)
-        escape_path(block->params, &block->emitters, &block->state, block->list[i],
-                    block->results[block->list[i]]);
+    for (int i = 0; i < (int)misses->count; i++)
+        shade_miss_path(block->params, &block->emitters, &block->state, block->list[i],
+                        block->results[block->list[i]]);
 }
 
 // Moves a plane of all paths that have hit something, those on opaque surfaces in front.
-INLINE void move_hits(__local float *to, __local const float *from, const Ends *ends, __local float *spare) {
+INLINE void compact_hit_plane(__local float *to, __local const float *from, const RayEnds *ends,
+                              __local float *spare) {
 #ifdef MEDIA
-    move_plane(spare, from, &ends->media);
+    compact_plane(spare, from, &ends->media);
 #endif
-    move_plane(to, from, &ends->surfaces);
+    compact_plane(to, from, &ends->surfaces);
 #ifdef MEDIA
     for (uint first = 0; first < ends->media.count; first += LANE_COUNT)
         store_lanes(to + ends->surfaces.count + first, load_lanes(spare + first));
@@ -249,16 +253,16 @@ INLINE void move_hits(__local float *to, __local const float *from, const Ends *
 }
 
 // Moves those paths to their own planes; returns how many they are.
-STAGE uint gather_hits(Block *block, const Ends *ends) {
+STAGE uint compact_hits(Block *block, const RayEnds *ends) {
     const State *state = &block->state;
     __local float *rays = block->own_rays, *paths = block->own_paths, *spare = block->spare;
     for (uint p = RAY_DIRECTION_X; p <= RAY_DIRECTION_Z; p++)
-        move_hits(rays + p * BLOCK_STRIDE, state->rays + p * BLOCK_STRIDE, ends, spare);
+        compact_hit_plane(rays + p * BLOCK_STRIDE, state->rays + p * BLOCK_STRIDE, ends, spare);
     for (uint p = 0; p <= LAST_CARRIED; p++)
-        move_hits(paths + p * BLOCK_STRIDE, state->paths + p * BLOCK_STRIDE, ends, spare);
+        compact_hit_plane(paths + p * BLOCK_STRIDE, state->paths + p * BLOCK_STRIDE, ends, spare);
     for (uint p = HIT_DISTANCE; p <= HIT_TRIANGLE; p++)
         if (p != HIT_MATERIAL)
-            move_hits(state->hits + p * BLOCK_STRIDE, state->hits + p * BLOCK_STRIDE, ends, spare);
+            compact_hit_plane(state->hits + p * BLOCK_STRIDE, state->hits + p * BLOCK_STRIDE, ends, spare);
     place_paths(block, rays, paths);
 #ifdef MEDIA
     return ends->surfaces.count + ends->media.count;
@@ -268,43 +272,44 @@ STAGE uint gather_hits(Block *block, const Ends *ends) {
 }
 
 #ifdef LIGHT_SAMPLING
-#ifdef FEW_ON_TOP
+#ifdef BRUTE_FORCE
 // Planes of shadow rays that are swept: those of ShadowPlane up to the radiance that they bring, and where
 // that is gathered.
-#define SWEPT_RESULT SHADOW_PDF
-#define SWEPT_FOUND (SWEPT_RESULT + 1 - SWEEP_PLACE)
+#define SHADOW_RESULT SHADOW_PDF
+#define SHADOW_FOUND (SHADOW_RESULT + 1 - FOUND_PLACE)
 
-INLINE void occlude_swept(const State *state, __local const float *rays, __local const float *found, uint i) {
-    int free = load_bits(found, SWEEP_PLACE * BLOCK_STRIDE + i) == NO_INDEX;
+INLINE void add_unoccluded(const State *state, __local const float *rays, __local const float *found,
+                           uint i) {
+    int free = load_bits(found, FOUND_PLACE * BLOCK_STRIDE + i) == NO_INDEX;
     Vec3 light = load3(rays + SHADOW_RADIANCE_R * BLOCK_STRIDE, BLOCK_STRIDE, i);
-    gather(state, load_bits(rays, SWEPT_RESULT * BLOCK_STRIDE + i),
-           choose(free, light, vec3(0.0f, 0.0f, 0.0f)));
+    accumulate(state, load_bits(rays, SHADOW_RESULT * BLOCK_STRIDE + i),
+               select(free, light, vec3(0.0f, 0.0f, 0.0f)));
 }
 
 // Which shadow rays nothing in the top level is in the way of; returns how many. Their paths come to stand in
 // `list`, or, where there is nothing but the top level, gather what they bring.
-STAGE uint sweep_shadows(const Block *block, uint count) {
-    Picked kinds[3];
+STAGE uint shadows_by_brute_force(const Block *block, uint count) {
+    Subset kinds[3];
     const State *state = &block->state;
-    __local float *rays = block->spare, *found = rays + SWEPT_FOUND * BLOCK_STRIDE;
+    __local float *rays = block->spare, *found = rays + SHADOW_FOUND * BLOCK_STRIDE;
     uint free = 0;
-    pick_rays(block, state->shadows, CLASS_SHADOW, count, kinds);
+    subsets_by_axis(block, state->shadows, CLASS_SHADOW, count, kinds);
     for (uint axis = 0; axis < 3; axis++) {
-        const Picked *picked = &kinds[axis];
+        const Subset *subset = &kinds[axis];
         for (uint p = 0; p < SHADOW_PDF; p++)
-            move_plane(rays + p * BLOCK_STRIDE, state->shadows + p * BLOCK_STRIDE, picked);
-        sweep_any_rays(&block->sweep, rays, axis, picked->count, found);
-#ifdef ALL_SWEPT
-        move_plane(rays + SWEPT_RESULT * BLOCK_STRIDE, (__local const float *)block->results, picked);
+            compact_plane(rays + p * BLOCK_STRIDE, state->shadows + p * BLOCK_STRIDE, subset);
+        brute_force_any(&block->brute_force, rays, axis, subset->count, found);
+#ifdef BRUTE_FORCE_ONLY
+        compact_plane(rays + SHADOW_RESULT * BLOCK_STRIDE, (__local const float *)block->results, subset);
         LANES
-        for (int i = 0; i < (int)picked->count; i++)
-            occlude_swept(state, rays, found, i);
+        for (int i = 0; i < (int)subset->count; i++)
+            add_unoccluded(state, rays, found, i);
 #else
         __local uint *paths = (__local uint *)rays; // which are done with
-        list_picked(paths, picked, 0);
-        const Picked unmet = pick((__local const uint *)found + SWEEP_PLACE * BLOCK_STRIDE, NO_INDEX,
-                                  picked->count, block->words);
-        move_plane((__local float *)block->list + free, (__local const float *)paths, &unmet);
+        list_subset(paths, subset, 0);
+        const Subset unmet = subset_where((__local const uint *)found + FOUND_PLACE * BLOCK_STRIDE, NO_INDEX,
+                                          subset->count, block->words);
+        compact_plane((__local float *)block->list + free, (__local const float *)paths, &unmet);
         free += unmet.count;
 #endif
     }
@@ -314,25 +319,25 @@ STAGE uint sweep_shadows(const Block *block, uint count) {
 
 // Traces the shadow rays that paths ask for, and adds what they bring.
 STAGE void trace_shadows(const Block *block, uint count) {
-#ifdef FEW_ON_TOP
-    uint listed = sweep_shadows(block, count);
+#ifdef BRUTE_FORCE
+    uint listed = shadows_by_brute_force(block, count);
 #else
-    Picked picked;
-    pick_rays(block, block->state.shadows, CLASS_SHADOW, count, &picked);
-    list_picked(block->list, &picked, 0);
-    uint listed = picked.count;
+    Subset subset;
+    subsets_by_axis(block, block->state.shadows, CLASS_SHADOW, count, &subset);
+    list_subset(block->list, &subset, 0);
+    uint listed = subset.count;
 #endif
-#ifndef ALL_SWEPT
-    prepare_flights(block, block->state.shadows, count);
-    fly_to_lights(&block->geometry, &block->state, block->spare, block->list, listed);
+#ifndef BRUTE_FORCE_ONLY
+    prepare_rays(block, block->state.shadows, count);
+    interleaved_any(&block->geometry, &block->state, block->spare, block->list, listed);
 #endif
 }
 #endif
 
-STAGE void describe_hits(const Block *block, uint count) {
+STAGE void setup_surfaces(const Block *block, uint count) {
     LANES
     for (int i = 0; i < (int)count; i++)
-        describe_path(&block->geometry, &block->state, i);
+        setup_surface_path(&block->geometry, &block->state, i);
 }
 
 #ifdef MEDIA
@@ -343,20 +348,20 @@ STAGE void shade_media(const Block *block, uint first, uint count) {
 #if defined(LIGHT_SAMPLING) && !defined(SMOOTH_MEDIA)
     LANES
     for (int i = first; i < (int)count; i++)
-        illuminate_path(block->params, &block->emitters, state, i);
+        sample_lights_path(block->params, &block->emitters, state, i);
 #endif
     LANES
     for (int i = first; i < (int)count; i++)
         shade_medium_path(block->params, block->emitters.materials, state, i, block->results[i]);
     __local const uint *classes = (__local const uint *)state->paths + PATH_CLASS * BLOCK_STRIDE;
-    const Picked picked = pick(classes + first, CLASS_SURFACE, count - first, block->words);
+    const Subset subset = subset_where(classes + first, CLASS_SURFACE, count - first, block->words);
     __local uint *list = block->list;
-    list_picked(list, &picked, first);
-    const uint opaque = picked.count;
+    list_subset(list, &subset, first);
+    const uint opaque = subset.count;
 #ifdef LIGHT_SAMPLING
     LANES
     for (int i = 0; i < (int)opaque; i++)
-        illuminate_path(block->params, &block->emitters, state, list[i]);
+        sample_lights_path(block->params, &block->emitters, state, list[i]);
     LANES
     for (int i = 0; i < (int)opaque; i++)
         absorb_light(block->emitters.materials, state, list[i]);
@@ -378,7 +383,7 @@ STAGE void shade_surfaces(const Block *block, uint count) {
 #ifdef LIGHT_SAMPLING
     LANES
     for (int i = 0; i < (int)count; i++)
-        illuminate_path(block->params, &block->emitters, &block->state, i);
+        sample_lights_path(block->params, &block->emitters, &block->state, i);
 #endif
     LANES
     for (int i = 0; i < (int)count; i++)
@@ -391,13 +396,13 @@ INLINE void trace_block(Block *block, uint first, uint count) {
     start_paths(block, first, count);
     for (uint ray = 0; count > 0; ray++) {
         count = trace_rays(block, count, ray == 0);
-        Ends ends;
-        tell_apart(block, count, &ends);
+        RayEnds ends;
+        sort_by_ends(block, count, &ends);
         const float *sky = block->params->environment_color;
         if (sky[0] + sky[1] + sky[2] > 0.0f)
-            escape_paths(block, &ends.escaped);
-        count = gather_hits(block, &ends);
-        describe_hits(block, count);
+            shade_misses(block, &ends.misses);
+        count = compact_hits(block, &ends);
+        setup_surfaces(block, count);
 #ifdef MEDIA
         shade_media(block, ends.surfaces.count, count);
 #else
@@ -424,8 +429,9 @@ INLINE void trace_block(Block *block, uint first, uint count) {
         __global const float *environment_marginal, __global const float *environment_conditional,           \
         __global const float *environment_pdf, __local float *rays, __local float *paths,                    \
         __local float *shadows_and_hits, __local float *radiance, __local uint *list, __local uint *words,   \
-        __local uint *rows, __local float *spare, __global const Facet *facets,                              \
-        __global const Solid *solids, __global const Cluster *clusters, const uint cluster_count
+        __local uint *rows, __local float *spare, __global const Quad *quads,                                \
+        __global const Parallelepiped *parallelepipeds, __global const Cluster *clusters,                    \
+        const uint cluster_count
 
 #define BLOCK(params, slots)                                                                                 \
     {params,                                                                                                 \
@@ -433,7 +439,7 @@ INLINE void trace_block(Block *block, uint first, uint count) {
      {top_nodes, top_packs, nodes, packs, objects, normals},                                                 \
      {materials, lights, environment_image, environment_marginal, environment_conditional, environment_pdf}, \
      layers,                                                                                                 \
-     {facets, solids, clusters, cluster_count},                                                              \
+     {quads, parallelepipeds, clusters, cluster_count},                                                      \
      {rays, paths, shadows_and_hits + SHADOW_PLANES * BLOCK_STRIDE, shadows_and_hits, radiance},             \
      rays,                                                                                                   \
      paths,                                                                                                  \

@@ -17,7 +17,7 @@ __kernel void first_hits(const Params params, const uint pixels, __global const 
     Vec3 nothing = vec3(0.0f, 0.0f, 0.0f);
     object_ids[pixel] = object;
     store3(surface, pixels, pixel,
-           choose(missed, nothing, load3(hits + HIT_SHADING_X * stride, stride, path)));
+           select(missed, nothing, load3(hits + HIT_SHADING_X * stride, stride, path)));
     surface[3u * pixels + pixel] = missed ? INFINITY : hits[HIT_DISTANCE * stride + path];
-    store3(surface + 4u * pixels, pixels, pixel, choose(missed, nothing, vec3(color[0], color[1], color[2])));
+    store3(surface + 4u * pixels, pixels, pixel, select(missed, nothing, vec3(color[0], color[1], color[2])));
 }

@@ -17,10 +17,10 @@ intersect(const Params params, const uint count, __global const uint *list, __gl
     const State state = {rays, paths, hits, 0, 0, params.path_stride, params.buffer_stride};
     const Geometry geometry = {top_nodes, top_packs, nodes, packs, objects, normals};
     if (trace_path(&geometry, &state, path)) {
-        describe_path(&geometry, &state, path);
+        setup_surface_path(&geometry, &state, path);
         store_bits(paths, PATH_CLASS * state.stride + path,
                    surface_class(&geometry, materials, &state, path));
     } else {
-        store_bits(paths, PATH_CLASS * state.stride + path, CLASS_ESCAPED);
+        store_bits(paths, PATH_CLASS * state.stride + path, CLASS_MISS);
     }
 }

@@ -5,7 +5,8 @@
 // Chooses a light for a path that stands on a surface: a direction, the radiance that comes along it when
 // nothing is in the way, and its density. A stage of its own, since all surfaces share it, and since what
 // PoCL vectorises it does in small kernels.
-INLINE void illuminate_path(const Params *params, const Emitters *emitters, const State *state, uint path) {
+INLINE void sample_lights_path(const Params *params, const Emitters *emitters, const State *state,
+                               uint path) {
     uint stride = STRIDE(state);
     Vec3 position = load3(state->hits + HIT_POSITION_X * stride, stride, path);
     uint seed = pixel_seed(load_bits(state->paths, PATH_PIXEL * stride + path), params->seed);
@@ -33,7 +34,7 @@ __kernel void sample_lights(const Params params, const uint count, __global cons
     Emitters emitters = {
         0, lights, environment_image, environment_marginal, environment_conditional, environment_pdf};
     uint item = (uint)get_global_id(0);
-    illuminate_path(&params, &emitters, &state, item < count ? list[item] : state.stride - 1u);
+    sample_lights_path(&params, &emitters, &state, item < count ? list[item] : state.stride - 1u);
 }
 #endif
 #endif

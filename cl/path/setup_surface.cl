@@ -4,12 +4,12 @@
 // What the surface is like where a ray met it: position, normals, material, rounding bound. Straight-line
 // code of scalars, so that PoCL runs it in SIMD lanes.
 
-// Scenes that need less have variants that do less: ALL_ON_TOP where every triangle lies in the packs of the
-// top level, in world space, and FLAT where no mesh has normals.
+// Scenes that need less have variants that do less: TOP_LEVEL_ONLY where every triangle lies in the packs of
+// the top level, in world space, and FLAT where no mesh has normals.
 
 // The unit vector along v, which is scaled before it is squared, because squares of very small or large
 // components would leave the range of a float.
-INLINE Vec3 safe_unit(Vec3 v) { return unit(scaled(bvh_scale(bvh_largest(v)), v)); }
+INLINE Vec3 safe_unit(Vec3 v) { return normalize(scale(bvh_scale(bvh_largest(v)), v)); }
 
 // A normal of object space in world space: by the inverse transpose, which keeps the outside outside, also
 // where the object is mirrored. Scaled before it is squared, because squares of very small or large
@@ -50,26 +50,26 @@ INLINE Vec3 shading_normal(__global const Object *object, __global const float *
                              weight.x * n[1] + weight.y * n[4] + weight.z * n[7],
                              weight.x * n[2] + weight.y * n[5] + weight.z * n[8]);
     smooth &= FABS(interpolated.x) + FABS(interpolated.y) + FABS(interpolated.z) >= 1e-6f;
-    Vec3 shading = world_normal(object, choose(smooth, interpolated, vec3(0.0f, 0.0f, 1.0f)));
-    shading = choose(inner(shading, geometric) < 0.0f, scaled(-1.0f, shading), shading);
-    return choose(smooth, shading, geometric);
+    Vec3 shading = world_normal(object, select(smooth, interpolated, vec3(0.0f, 0.0f, 1.0f)));
+    shading = select(dot(shading, geometric) < 0.0f, scale(-1.0f, shading), shading);
+    return select(smooth, shading, geometric);
 }
 
 // How a position on a triangle moves by that much towards its centroid. A ray that starts just above one face
 // but on the plane of its neighbour, which it must not miss, would slip out where the two meet.
 INLINE Vec3 leave_edge(Vec3 centroid, float offset, Vec3 position) {
     Vec3 inwards = subtract(centroid, position);
-    float share = offset / SQRT(inner(inwards, inwards));
+    float share = offset / SQRT(dot(inwards, inwards));
     return along(position, share < 1.0f ? share : 0.0f, inwards);
 }
 
 // Fills in the planes of a hit of which `trace_path` has left the distance, the object, the place of the
 // triangle, and the weights of its corners, up to a common factor, in place of the position.
-INLINE void describe_path(const Geometry *geometry, const State *state, uint path) {
+INLINE void setup_surface_path(const Geometry *geometry, const State *state, uint path) {
     uint stride = STRIDE(state);
     __global const Object *object = geometry->objects + load_bits(state->hits, HIT_OBJECT * stride + path);
     uint place = load_bits(state->hits, HIT_TRIANGLE * stride + path);
-#ifdef ALL_ON_TOP
+#ifdef TOP_LEVEL_ONLY
     __global const TrianglePack *packs = geometry->top_packs;
 #else
     int on_top = (place & NODE_PACK) != 0u;
@@ -80,15 +80,15 @@ INLINE void describe_path(const Geometry *geometry, const State *state, uint pat
     uint face = pack->face[lane];
     Vec3 a = pack_vertex(pack, 0, lane), b = pack_vertex(pack, 1, lane), c = pack_vertex(pack, 2, lane);
     Vec3 weight = load3(state->hits + HIT_POSITION_X * stride, stride, path);
-    weight = scaled(1.0f / (weight.x + weight.y + weight.z), weight);
-    Vec3 position = add(scaled(weight.x, a), add(scaled(weight.y, b), scaled(weight.z, c)));
-    Vec3 centroid = scaled(1.0f / 3.0f, add(a, add(b, c)));
+    weight = scale(1.0f / (weight.x + weight.y + weight.z), weight);
+    Vec3 position = add(scale(weight.x, a), add(scale(weight.y, b), scale(weight.z, c)));
+    Vec3 centroid = scale(1.0f / 3.0f, add(a, add(b, c)));
     Vec3 normal = bvh_normal(a, b, c);
-    Vec3 geometric = scaled(object->winding, safe_unit(normal));
-#ifndef ALL_ON_TOP
-    position = choose(on_top, position, world_point(object, position));
-    centroid = choose(on_top, centroid, world_point(object, centroid));
-    geometric = choose(on_top, geometric, world_normal(object, normal));
+    Vec3 geometric = scale(object->winding, safe_unit(normal));
+#ifndef TOP_LEVEL_ONLY
+    position = select(on_top, position, world_point(object, position));
+    centroid = select(on_top, centroid, world_point(object, centroid));
+    geometric = select(on_top, geometric, world_normal(object, normal));
 #endif
     float offset = offset_bound(object, geometric);
     store3(state->hits + HIT_POSITION_X * stride, stride, path, leave_edge(centroid, offset, position));

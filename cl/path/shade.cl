@@ -6,9 +6,9 @@
 //
 //   L_o(wo) = L_e(wo) + integral of f(wo, wi) L_i(wi) cos(wi) d wi
 //
-// with the integral estimated by light sampling (`illuminate` has chosen a light) and by BSDF sampling (the
-// next ray, whose emission counts at its end), combined by multiple importance sampling. Straight-line code
-// of scalars, so that PoCL runs it in SIMD lanes.
+// with the integral estimated by light sampling (`sample_lights` has chosen a light) and by BSDF sampling
+// (the next ray, whose emission counts at its end), combined by multiple importance sampling. Straight-line
+// code of scalars, so that PoCL runs it in SIMD lanes.
 
 // The path's end: rays after which no path goes on gather emission only.
 INLINE void finish_path(__global const Material *materials, const State *state, uint path, uint result) {
@@ -18,9 +18,9 @@ INLINE void finish_path(__global const Material *materials, const State *state, 
     Vec3 geometric = load3(state->hits + HIT_GEOMETRIC_X * stride, stride, path);
     Vec3 throughput = load3(state->paths + PATH_THROUGHPUT_R * stride, stride, path);
     Vec3 emitted =
-        emitted_radiance(material, -inner(geometric, direction), state->hits[HIT_DISTANCE * stride + path],
+        emitted_radiance(material, -dot(geometric, direction), state->hits[HIT_DISTANCE * stride + path],
                          state->paths[PATH_BSDF_PDF * stride + path]);
-    gather(state, result, times(throughput, emitted));
+    accumulate(state, result, mul(throughput, emitted));
     store_bits(state->paths, PATH_CLASS * stride + path, 0u);
 }
 
@@ -43,17 +43,17 @@ INLINE void shade_path(const Params *params, __global const Material *materials,
     uint bounces = counts & 0xffu;
     uint ray = (counts >> 16) & 0xffu;
 
-    float facing = -inner(geometric, direction);
+    float facing = -dot(geometric, direction);
     Vec3 emitted = emitted_radiance(material, facing, distance, bsdf_pdf);
-    gather(state, result, times(throughput, emitted));
+    accumulate(state, result, mul(throughput, emitted));
 
     // The surface as seen along the ray: both normals on its side.
     float side = facing > 0.0f ? 1.0f : -1.0f;
-    geometric = scaled(side, geometric);
-    shading = scaled(side, shading);
-    shading = choose(inner(shading, direction) < -1e-4f, shading, geometric);
+    geometric = scale(side, geometric);
+    shading = scale(side, shading);
+    shading = select(dot(shading, direction) < -1e-4f, shading, geometric);
     Frame frame = frame_of(shading);
-    Vec3 wo = to_local(frame, scaled(-1.0f, direction));
+    Vec3 wo = to_local(frame, scale(-1.0f, direction));
     wo.z = MAX(wo.z, 1e-4f);
     Surface surface = surface_of(material, layers + material_index * (ALBEDO_TABLE_SIZE + 1u));
     Vec3 origin = along(position, offset, geometric);
@@ -69,12 +69,11 @@ INLINE void shade_path(const Params *params, __global const Material *materials,
     Vec3 to_light = load3(state->shadows + SHADOW_DIRECTION_X * stride, stride, path);
     float light_pdf = state->shadows[SHADOW_PDF * stride + path];
     BsdfValue towards_light = eval_surface(&surface, wo, to_local(frame, to_light));
-    int lit =
-        scatters & (light_pdf > 0.0f) & (towards_light.pdf > 0.0f) & (inner(geometric, to_light) > 0.0f);
+    int lit = scatters & (light_pdf > 0.0f) & (towards_light.pdf > 0.0f) & (dot(geometric, to_light) > 0.0f);
     light_pdf = lit ? light_pdf : 1.0f;
     float light_weight = mis_weight(light_pdf, towards_light.pdf) / light_pdf;
     Vec3 arriving = load3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path);
-    arriving = times(times(throughput, towards_light.f_cos), scaled(light_weight, arriving));
+    arriving = mul(mul(throughput, towards_light.f_cos), scale(light_weight, arriving));
     store3(state->shadows + SHADOW_ORIGIN_X * stride, stride, path, origin);
     store3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path, arriving);
     path_class = (lit & (largest(arriving) > 0.0f)) ? CLASS_SHADOW : 0u;
@@ -83,17 +82,17 @@ INLINE void shade_path(const Params *params, __global const Material *materials,
     // BSDF sampling: the next ray.
     BsdfSample next = sample_surface(&surface, wo, uniform_2d(seed, sample, PAIR_DIRECTION(ray)), choices.u);
     Vec3 next_direction = from_local(frame, next.wi);
-    throughput = times(throughput, next.weight);
-    int goes_on = scatters & (next.pdf > 0.0f) & (inner(geometric, next_direction) > 0.0f);
+    throughput = mul(throughput, next.weight);
+    int goes_on = scatters & (next.pdf > 0.0f) & (dot(geometric, next_direction) > 0.0f);
 
     // Russian roulette: a path that carries little may end, one that survives stands for those that did not.
     float survival = survival_probability(throughput, bounces, params->roulette_depth);
     float luck = uniform_2d(seed, sample, PAIR_LUCK(ray)).u;
     goes_on = goes_on & (luck < survival) & (largest(throughput) > 0.0f);
-    throughput = scaled(1.0f / survival, throughput);
+    throughput = scale(1.0f / survival, throughput);
 
     store3(state->rays + RAY_ORIGIN_X * stride, stride, path, origin);
-    store3(state->rays + RAY_DIRECTION_X * stride, stride, path, unit(next_direction));
+    store3(state->rays + RAY_DIRECTION_X * stride, stride, path, normalize(next_direction));
     store3(state->paths + PATH_THROUGHPUT_R * stride, stride, path, throughput);
     state->paths[PATH_BSDF_PDF * stride + path] = next.pdf;
     store_bits(state->paths, PATH_COUNTS * stride + path, counts + 0x10001u);

@@ -5,7 +5,7 @@
 // `shade` by its class. Straight-line code of scalars, so that PoCL runs it in SIMD lanes. The variant
 // SMOOTH_MEDIA serves scenes without rough transparent bodies.
 
-// What a rough boundary scatters of the light sample that `illuminate` left; that stays for `opaque`
+// What a rough boundary scatters of the light sample that `sample_lights` left; that stays for `opaque`
 // surfaces. Whether it asks for a shadow ray.
 INLINE int light_boundary(__global const Material *materials, const State *state, uint path,
                           const Boundary *boundary, Frame frame, Vec3 wo, Vec3 geometric, Vec3 throughput,
@@ -16,17 +16,17 @@ INLINE int light_boundary(__global const Material *materials, const State *state
     Vec3 to_light = load3(state->shadows + SHADOW_DIRECTION_X * stride, stride, path);
     float light_pdf = state->shadows[SHADOW_PDF * stride + path];
     BsdfValue value = eval_rough_boundary(boundary, wo, to_local(frame, to_light));
-    float above = inner(geometric, to_light);
-    int lit = (light_pdf > 0.0f) & (value.pdf > 0.0f) & (above * inner(frame.normal, to_light) > 0.0f);
+    float above = dot(geometric, to_light);
+    int lit = (light_pdf > 0.0f) & (value.pdf > 0.0f) & (above * dot(frame.normal, to_light) > 0.0f);
     light_pdf = lit ? light_pdf : 1.0f;
     float weight = mis_weight(light_pdf, value.pdf) / light_pdf;
     Vec3 passed =
         transmittance(materials, above > 0.0f ? near : far, state->shadows[SHADOW_DISTANCE * stride + path]);
     Vec3 light = load3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path);
-    Vec3 arriving = times(times(times(throughput, value.f_cos), scaled(weight, light)), passed);
+    Vec3 arriving = mul(mul(mul(throughput, value.f_cos), scale(weight, light)), passed);
     Vec3 origin = along(position, above > 0.0f ? offset : -offset, geometric);
     store3(state->shadows + SHADOW_ORIGIN_X * stride, stride, path, origin);
-    store3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path, choose(opaque, light, arriving));
+    store3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path, select(opaque, light, arriving));
     return lit;
 }
 
@@ -50,14 +50,14 @@ INLINE void shade_medium_path(const Params *params, __global const Material *mat
 
     // Absorption on the way here.
     MediumStack before = load_medium_stack(state, path);
-    throughput = times(throughput, transmittance(materials, before.entry[0], distance));
+    throughput = mul(throughput, transmittance(materials, before.entry[0], distance));
 
     // Opaque, or taken for opaque by chance where the material is partly transmissive.
     Uniform2 luck = uniform_2d(seed, sample, PAIR_LUCK(ray));
     int opaque = luck.v >= material->transmission;
-    float facing = -inner(geometric, direction);
+    float facing = -dot(geometric, direction);
     Vec3 emitted = emitted_radiance(material, facing, distance, bsdf_pdf);
-    gather(state, result, choose(opaque, vec3(0.0f, 0.0f, 0.0f), times(throughput, emitted)));
+    accumulate(state, result, select(opaque, vec3(0.0f, 0.0f, 0.0f), mul(throughput, emitted)));
 
     // The media on both sides. A ray that leaves a body which it never entered started inside of it.
     int outside = facing > 0.0f;
@@ -69,11 +69,11 @@ INLINE void shade_medium_path(const Params *params, __global const Material *mat
     int covered = near == far; // a body of higher priority hides this boundary
 
     float side = outside ? 1.0f : -1.0f;
-    geometric = scaled(side, geometric);
-    shading = scaled(side, shading);
-    shading = choose(inner(shading, direction) > -1e-4f, geometric, shading);
+    geometric = scale(side, geometric);
+    shading = scale(side, shading);
+    shading = select(dot(shading, direction) > -1e-4f, geometric, shading);
     Frame frame = frame_of(shading);
-    Vec3 wo = to_local(frame, scaled(-1.0f, direction));
+    Vec3 wo = to_local(frame, scale(-1.0f, direction));
     wo.z = MAX(wo.z, 1e-4f);
     Boundary boundary;
     boundary.eta = medium_ior(materials, far) / medium_ior(materials, near);
@@ -97,28 +97,28 @@ INLINE void shade_medium_path(const Params *params, __global const Material *mat
 #endif
     BsdfSample rough =
         sample_rough_boundary(&boundary, wo, uniform_2d(seed, sample, PAIR_DIRECTION(ray)), choices.u);
-    next.wi = choose(smooth, next.wi, rough.wi);
-    next.weight = choose(smooth, next.weight, rough.weight);
+    next.wi = select(smooth, next.wi, rough.wi);
+    next.weight = select(smooth, next.weight, rough.weight);
     next.pdf = smooth ? next.pdf : rough.pdf;
 #endif
-    next.wi = choose(covered, scaled(-1.0f, wo), next.wi);
-    next.weight = choose(covered, vec3(1.0f, 1.0f, 1.0f), next.weight);
+    next.wi = select(covered, scale(-1.0f, wo), next.wi);
+    next.weight = select(covered, vec3(1.0f, 1.0f, 1.0f), next.weight);
     next.pdf = covered ? 0.0f : next.pdf;
     int reflected = next.wi.z > 0.0f;
-    Vec3 next_direction = choose(covered, direction, unit(from_local(frame, next.wi)));
-    float leaving = inner(geometric, next_direction);
+    Vec3 next_direction = select(covered, direction, normalize(from_local(frame, next.wi)));
+    float leaving = dot(geometric, next_direction);
     int possible = (covered | smooth | (next.pdf > 0.0f)) & (reflected ? leaving > 0.0f : leaving < 0.0f);
 
     // Passages and inner reflections of smooth bodies have a budget of their own; a covered boundary is none.
     int passage = smooth & !(reflected & outside);
     bounces += (!covered) & (!passage);
     passages += (!covered) & passage;
-    Vec3 carried = times(throughput, next.weight);
+    Vec3 carried = mul(throughput, next.weight);
     float survival = survival_probability(carried, counts & 0xffu, params->roulette_depth);
     int goes_on = possible & (bounces <= params->max_bounces + 1u) &
                   (passages <= params->transmission_bounces) & (ray < 250u) & (largest(carried) > 0.0f) &
                   (luck.u < survival);
-    carried = scaled(1.0f / survival, carried);
+    carried = scale(1.0f / survival, carried);
 
     MediumStack after;
 #pragma unroll
@@ -131,8 +131,8 @@ INLINE void shade_medium_path(const Params *params, __global const Material *mat
     store_medium_stack(state, path, &after);
     store3(state->rays + RAY_ORIGIN_X * stride, stride, path,
            along(position, reflected ? offset : -offset, geometric));
-    store3(state->rays + RAY_DIRECTION_X * stride, stride, path, choose(opaque, direction, next_direction));
-    store3(state->paths + PATH_THROUGHPUT_R * stride, stride, path, choose(opaque, throughput, carried));
+    store3(state->rays + RAY_DIRECTION_X * stride, stride, path, select(opaque, direction, next_direction));
+    store3(state->paths + PATH_THROUGHPUT_R * stride, stride, path, select(opaque, throughput, carried));
     state->paths[PATH_BSDF_PDF * stride + path] = opaque ? bsdf_pdf : next.pdf;
     store_bits(state->paths, PATH_COUNTS * stride + path, opaque ? counts : new_counts);
     store_bits(state->paths, PATH_CLASS * stride + path, opaque ? CLASS_SURFACE : path_class);
@@ -145,7 +145,7 @@ INLINE void absorb_light(__global const Material *materials, const State *state,
     Vec3 passed = transmittance(materials, load_medium_stack(state, path).entry[0],
                                 state->shadows[SHADOW_DISTANCE * stride + path]);
     Vec3 light = load3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path);
-    store3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path, times(passed, light));
+    store3(state->shadows + SHADOW_RADIANCE_R * stride, stride, path, mul(passed, light));
 }
 
 #ifndef BLOCKS

@@ -43,7 +43,7 @@ INLINE uint load_bits(STATE const float *planes, uint place) { return ((STATE co
 INLINE void store_bits(STATE float *planes, uint place, uint bits) { ((STATE uint *)planes)[place] = bits; }
 
 // Adds to what a path has gathered; `result` is its place there.
-INLINE void gather(const State *state, uint result, Vec3 radiance) {
+INLINE void accumulate(const State *state, uint result, Vec3 radiance) {
     store3(state->radiance, RADIANCE_STRIDE(state), result,
            add(load3(state->radiance, RADIANCE_STRIDE(state), result), radiance));
 }

@@ -11,8 +11,8 @@
 #define TRACE_CALL static inline
 #endif
 
-// Leaves the nearest hit of a path's ray in its planes, as far as `describe_path` needs it. False, and object
-// NO_INDEX, where the ray leaves the scene.
+// Leaves the nearest hit of a path's ray in its planes, as far as `setup_surface_path` needs it. False, and
+// object NO_INDEX, where the ray leaves the scene.
 TRACE_CALL bool trace_path(const Geometry *geometry, const State *state, uint path) {
     const uint stride = STRIDE(state);
     const Vec3 origin = load3(state->rays + RAY_ORIGIN_X * stride, stride, path);

@@ -2,9 +2,10 @@
 
 #include "path/trace.cl"
 
-INLINE void occlude_path(const Geometry *geometry, const State *state, uint path, uint result) {
+INLINE void trace_shadow_path(const Geometry *geometry, const State *state, uint path, uint result) {
     if (!is_occluded(geometry, state, path))
-        gather(state, result, load3(state->shadows + SHADOW_RADIANCE_R * STRIDE(state), STRIDE(state), path));
+        accumulate(state, result,
+                   load3(state->shadows + SHADOW_RADIANCE_R * STRIDE(state), STRIDE(state), path));
 }
 
 #ifndef BLOCKS
@@ -20,6 +21,6 @@ trace_shadow(const Params params, const uint count, __global const uint *list, _
     const uint path = list[get_global_id(0)];
     const State state = {0, 0, 0, shadows, radiance, params.path_stride, params.buffer_stride};
     const Geometry geometry = {top_nodes, top_packs, nodes, packs, objects, 0};
-    occlude_path(&geometry, &state, path, params.first_path + path);
+    trace_shadow_path(&geometry, &state, path, params.first_path + path);
 }
 #endif

@@ -7,5 +7,5 @@ INLINE Vec3 camera_direction(const Params *params, float x, float y) {
     Vec3 forward = vec3(params->camera.forward[0], params->camera.forward[1], params->camera.forward[2]);
     float sx = 2.0f * x / (float)params->width - 1.0f;
     float sy = 1.0f - 2.0f * y / (float)params->height;
-    return unit(add(forward, add(scaled(sx, right), scaled(sy, up))));
+    return normalize(add(forward, add(scale(sx, right), scale(sy, up))));
 }

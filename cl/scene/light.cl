@@ -83,7 +83,7 @@ INLINE Vec3 eval_environment(const Params *params, const Emitters *emitters, Vec
 #ifdef ENVIRONMENT_IMAGE
     Uniform2 place = environment_place(params, direction);
     *pdf = environment_pdf(params, emitters, place);
-    return times(color, image_radiance(params, emitters, place));
+    return mul(color, image_radiance(params, emitters, place));
 #else
     *pdf = 0.0f;
     return color;
@@ -129,14 +129,14 @@ INLINE LightSample sample_triangle_light(const Params *params, const Emitters *e
     Vec3 vertex = light_vec3(lights + LIGHT_VERTEX_X * stride, stride, light);
     Vec3 edge_1 = light_vec3(lights + LIGHT_EDGE_1_X * stride, stride, light);
     Vec3 edge_2 = light_vec3(lights + LIGHT_EDGE_2_X * stride, stride, light);
-    Vec3 point = add(vertex, add(scaled(b1, edge_1), scaled(b2, edge_2)));
-    Vec3 normal = unit(outer(edge_1, edge_2));
+    Vec3 point = add(vertex, add(scale(b1, edge_1), scale(b2, edge_2)));
+    Vec3 normal = normalize(cross(edge_1, edge_2));
     Vec3 to_light = subtract(point, position);
-    float squared = inner(to_light, to_light);
+    float squared = dot(to_light, to_light);
     LightSample result;
     result.distance = SQRT(squared);
-    result.direction = scaled(1.0f / MAX(result.distance, 1e-30f), to_light);
-    float cosine = -inner(normal, result.direction);
+    result.direction = scale(1.0f / MAX(result.distance, 1e-30f), to_light);
+    float cosine = -dot(normal, result.direction);
     int double_sided = ((__global const uint *)lights)[LIGHT_DOUBLE_SIDED * stride + light] != 0u;
     int shines = double_sided | (cosine > 0.0f);
     float facing = FABS(cosine);
@@ -158,9 +158,9 @@ INLINE LightSample sample_light(const Params *params, const Emitters *emitters, 
     LightSample b = sample_triangle_light(params, emitters, position, uv,
                                           MIN(MAX(choice - p, 0.0f) / (1.0f - p), 0.99999994f));
     LightSample result;
-    result.direction = choose(far, a.direction, b.direction);
+    result.direction = select(far, a.direction, b.direction);
     result.distance = far ? a.distance : b.distance;
-    result.radiance = choose(far, a.radiance, b.radiance);
+    result.radiance = select(far, a.radiance, b.radiance);
     result.pdf = far ? a.pdf : b.pdf;
     return result;
 #elif defined(ENVIRONMENT_IMAGE)
@@ -178,5 +178,5 @@ INLINE Vec3 emitted_radiance(__global const Material *material, float facing, fl
     int shines = ((material->flags & MATERIAL_DOUBLE_SIDED) != 0u) | (facing > 0.0f);
     float light_pdf = material->light_pdf * distance * distance / MAX(FABS(facing), 1e-7f);
     float weight = bsdf_pdf > 0.0f ? mis_weight(MAX(bsdf_pdf, 1e-30f), light_pdf) : 1.0f;
-    return scaled(shines ? weight : 0.0f, material_vec3(material->emission));
+    return scale(shines ? weight : 0.0f, material_vec3(material->emission));
 }

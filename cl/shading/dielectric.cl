@@ -30,19 +30,19 @@ INLINE float boundary_reflectance(const Boundary *b, float cosine) {
 // The direction behind the boundary of light that comes along wo, for a microfacet normal h with
 // <wo, h> > 0; of no meaning under total internal reflection.
 INLINE Vec3 refracted(Vec3 wo, Vec3 h, float eta) {
-    float cosine = inner(wo, h);
+    float cosine = dot(wo, h);
     float cos_t = SQRT(MAX(1.0f - (1.0f - cosine * cosine) / (eta * eta), 0.0f));
-    return add(scaled(-1.0f / eta, wo), scaled(cosine / eta - cos_t, h));
+    return add(scale(-1.0f / eta, wo), scale(cosine / eta - cos_t, h));
 }
 
 // GGX with height-correlated Smith masking; the cosine of wi is in f_cos, pdf is per solid angle and that of
 // sample_rough_boundary. Radiance is scaled by 1 / eta^2 on its way through, as it travels against the path.
 INLINE BsdfValue eval_rough_boundary(const Boundary *b, Vec3 wo, Vec3 wi) {
     int reflects = wi.z > 0.0f;
-    Vec3 h = add(wo, scaled(reflects ? 1.0f : b->eta, wi));
-    float length2 = inner(h, h);
-    h = scaled((h.z < 0.0f ? -1.0f : 1.0f) / SQRT(MAX(length2, 1e-14f)), h);
-    float o_h = inner(wo, h), i_h = inner(wi, h);
+    Vec3 h = add(wo, scale(reflects ? 1.0f : b->eta, wi));
+    float length2 = dot(h, h);
+    h = scale((h.z < 0.0f ? -1.0f : 1.0f) / SQRT(MAX(length2, 1e-14f)), h);
+    float o_h = dot(wo, h), i_h = dot(wi, h);
     int possible = (length2 >= 1e-14f) & (wo.z > 0.0f) & (wi.z != 0.0f) & (o_h > 0.0f) &
                    (reflects ? i_h > 0.0f : i_h < 0.0f);
 
@@ -63,24 +63,24 @@ INLINE BsdfValue eval_rough_boundary(const Boundary *b, Vec3 wo, Vec3 wi) {
     float passed = (1.0f - f) * d * g2 * o_h * jacobian / (wo.z * b->eta * b->eta);
     float pdf = reflects ? f * visible_pdf / (4.0f * o_h) : (1.0f - f) * visible_pdf * jacobian;
     BsdfValue result;
-    result.f_cos = choose(reflects, vec3(reflected, reflected, reflected), scaled(passed, b->transmitted));
-    result.f_cos = choose(possible, result.f_cos, vec3(0.0f, 0.0f, 0.0f));
+    result.f_cos = select(reflects, vec3(reflected, reflected, reflected), scale(passed, b->transmitted));
+    result.f_cos = select(possible, result.f_cos, vec3(0.0f, 0.0f, 0.0f));
     result.pdf = possible ? pdf : 0.0f;
     return result;
 }
 
 INLINE BsdfSample sample_rough_boundary(const Boundary *b, Vec3 wo, Uniform2 uv, float lobe) {
     Vec3 h = sample_visible_normal(wo, b->alpha, uv.u, uv.v);
-    float o_h = inner(wo, h);
+    float o_h = dot(wo, h);
     int reflects = lobe < boundary_reflectance(b, o_h);
     BsdfSample result;
-    result.wi = choose(reflects, subtract(scaled(2.0f * o_h, h), wo), unit(refracted(wo, h, b->eta)));
+    result.wi = select(reflects, subtract(scale(2.0f * o_h, h), wo), normalize(refracted(wo, h, b->eta)));
     BsdfValue value = eval_rough_boundary(b, wo, result.wi);
     // A microfacet may send light to the wrong side of the surface: such samples are lost, as in nature
     // they would meet another facet.
     int valid = (value.pdf > 0.0f) & (reflects == (result.wi.z > 0.0f));
     result.pdf = valid ? value.pdf : 0.0f;
-    result.weight = scaled(valid ? 1.0f / value.pdf : 0.0f, value.f_cos);
+    result.weight = scale(valid ? 1.0f / value.pdf : 0.0f, value.f_cos);
     return result;
 }
 
@@ -88,9 +88,8 @@ INLINE BsdfSample sample_smooth_boundary(const Boundary *b, Vec3 wo, float lobe)
     int reflects = lobe < boundary_reflectance(b, wo.z);
     Vec3 normal = vec3(0.0f, 0.0f, 1.0f);
     BsdfSample result;
-    result.wi = choose(reflects, vec3(-wo.x, -wo.y, wo.z), unit(refracted(wo, normal, b->eta)));
-    result.weight =
-        choose(reflects, vec3(1.0f, 1.0f, 1.0f), scaled(1.0f / (b->eta * b->eta), b->transmitted));
+    result.wi = select(reflects, vec3(-wo.x, -wo.y, wo.z), normalize(refracted(wo, normal, b->eta)));
+    result.weight = select(reflects, vec3(1.0f, 1.0f, 1.0f), scale(1.0f / (b->eta * b->eta), b->transmitted));
     result.pdf = 0.0f; // a single direction: no density
     return result;
 }

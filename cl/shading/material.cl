@@ -41,7 +41,7 @@ INLINE Surface surface_of(__global const Material *material, __global const floa
     float specular = material->specular;
     float r = (material->ior - 1.0f) / (material->ior + 1.0f);
     float dielectric_f0 = specular * r * r;
-    s.base = scaled(1.0f - metallic, color);
+    s.base = scale(1.0f - metallic, color);
     s.f0 = vec3(LERP(dielectric_f0, color.x, metallic), LERP(dielectric_f0, color.y, metallic),
                 LERP(dielectric_f0, color.z, metallic));
     float f90 = LERP(specular, 1.0f, metallic);
@@ -69,12 +69,12 @@ INLINE float specular_probability(const Surface *s, float layer_wo) {
     return both ? CLAMP(share, 0.1f, 0.9f) : (diffuse > 0.0f ? 0.0f : 1.0f);
 }
 
-#ifdef MATT
+#ifdef MATTE
 INLINE BsdfValue eval_surface(const Surface *s, Vec3 wo, Vec3 wi) {
     int above = (wo.z > 0.0f) & (wi.z > 0.0f);
     float cosine = above ? wi.z : 0.0f;
     BsdfValue result;
-    result.f_cos = scaled(cosine * INV_PI, s->base);
+    result.f_cos = scale(cosine * INV_PI, s->base);
     result.pdf = cosine * INV_PI;
     return result;
 }
@@ -83,21 +83,21 @@ INLINE BsdfSample sample_surface(const Surface *s, Vec3 wo, Uniform2 direction, 
     BsdfSample result;
     result.wi = sample_cosine_hemisphere(direction.u, direction.v);
     result.pdf = wo.z > 0.0f ? result.wi.z * INV_PI : 0.0f;
-    result.weight = choose(result.pdf > 0.0f, s->base, vec3(0.0f, 0.0f, 0.0f));
+    result.weight = select(result.pdf > 0.0f, s->base, vec3(0.0f, 0.0f, 0.0f));
     return result;
 }
 #else
 INLINE BsdfValue eval_surface(const Surface *s, Vec3 wo, Vec3 wi) {
     float a2 = s->alpha * s->alpha;
-    Vec3 h = unit(add(wo, wi));
+    Vec3 h = normalize(add(wo, wi));
     float slope = (h.x * h.x + h.y * h.y) / a2 + h.z * h.z;
     float d = 1.0f / (PI * a2 * slope * slope);
     float root_o = SQRT(a2 + (1.0f - a2) * wo.z * wo.z);
     float root_i = SQRT(a2 + (1.0f - a2) * wi.z * wi.z);
     float v_cos = 0.5f * wi.z / (wi.z * root_o + wo.z * root_i);
-    float c = 1.0f - CLAMP(inner(wo, h), 0.0f, 1.0f);
+    float c = 1.0f - CLAMP(dot(wo, h), 0.0f, 1.0f);
     float schlick = c * c * c * c * c;
-    Vec3 fresnel = add(s->f0, scaled(schlick, subtract(s->f90, s->f0)));
+    Vec3 fresnel = add(s->f0, scale(schlick, subtract(s->f90, s->f0)));
 
     float layer_wo = layer_albedo(s, wo.z);
     float through = (1.0f - layer_wo) * (1.0f - layer_albedo(s, wi.z)) * s->layer[ALBEDO_TABLE_SIZE];
@@ -105,8 +105,8 @@ INLINE BsdfValue eval_surface(const Surface *s, Vec3 wo, Vec3 wi) {
 
     int above = (wo.z > 0.0f) & (wi.z > 0.0f);
     BsdfValue result;
-    result.f_cos = add(scaled(d * v_cos, fresnel), scaled(through * wi.z * INV_PI, s->base));
-    result.f_cos = choose(above, result.f_cos, vec3(0.0f, 0.0f, 0.0f));
+    result.f_cos = add(scale(d * v_cos, fresnel), scale(through * wi.z * INV_PI, s->base));
+    result.f_cos = select(above, result.f_cos, vec3(0.0f, 0.0f, 0.0f));
     float pdf = p * 0.5f * d / (wo.z + root_o) + (1.0f - p) * wi.z * INV_PI;
     result.pdf = above ? pdf : 0.0f;
     return result;
@@ -115,15 +115,15 @@ INLINE BsdfValue eval_surface(const Surface *s, Vec3 wo, Vec3 wi) {
 INLINE BsdfSample sample_surface(const Surface *s, Vec3 wo, Uniform2 direction, float lobe) {
     int specular = lobe < specular_probability(s, layer_albedo(s, wo.z));
     Vec3 h = sample_visible_normal(wo, s->alpha, direction.u, direction.v);
-    Vec3 reflected = subtract(scaled(2.0f * inner(wo, h), h), wo);
-    Vec3 wi = choose(specular, reflected, sample_cosine_hemisphere(direction.u, direction.v));
+    Vec3 reflected = subtract(scale(2.0f * dot(wo, h), h), wo);
+    Vec3 wi = select(specular, reflected, sample_cosine_hemisphere(direction.u, direction.v));
     BsdfValue value = eval_surface(s, wo, wi);
     int valid = value.pdf > 0.0f;
     BsdfSample result;
     result.wi = wi;
     result.pdf = value.pdf;
     result.weight =
-        choose(valid, scaled(1.0f / (valid ? value.pdf : 1.0f), value.f_cos), vec3(0.0f, 0.0f, 0.0f));
+        select(valid, scale(1.0f / (valid ? value.pdf : 1.0f), value.f_cos), vec3(0.0f, 0.0f, 0.0f));
     return result;
 }
 #endif

@@ -77,7 +77,7 @@ INLINE Vec3 transmittance(__global const Material *materials, uint medium, float
     __global const float *a = medium_material(materials, medium)->absorption;
     Vec3 depth = vec3(a[0] > 0.0f ? a[0] * distance : 0.0f, a[1] > 0.0f ? a[1] * distance : 0.0f,
                       a[2] > 0.0f ? a[2] * distance : 0.0f);
-    depth = choose(vacuum, vec3(0.0f, 0.0f, 0.0f), depth);
+    depth = select(vacuum, vec3(0.0f, 0.0f, 0.0f), depth);
     return vec3(exp_negative(-depth.x), exp_negative(-depth.y), exp_negative(-depth.z));
 #endif
 }

@@ -41,7 +41,7 @@ class _Part:
 
 @dataclass(frozen=True, eq=False)
 class BruteForceTables:
-    """Rows of layout.FACET, layout.SOLID and layout.CLUSTER, as the kernels read them."""
+    """Rows of layout.QUAD, layout.PARALLELEPIPED and layout.CLUSTER, as the kernels read them."""
 
     quads: npt.NDArray[np.void]
     parallelepipeds: npt.NDArray[np.void]
@@ -50,7 +50,9 @@ class BruteForceTables:
 
 def empty_tables() -> BruteForceTables:
     """Those of no objects."""
-    return BruteForceTables(np.zeros(0, layout.FACET), np.zeros(0, layout.SOLID), np.zeros(1, layout.CLUSTER))
+    return BruteForceTables(
+        np.zeros(0, layout.QUAD), np.zeros(0, layout.PARALLELEPIPED), np.zeros(1, layout.CLUSTER)
+    )
 
 
 def arrange(triangles: WorldTriangles, quads_of: Callable[[Mesh], Quads]) -> BruteForceTables | None:
@@ -115,8 +117,8 @@ def _tables(
     table["end"] = ends(~sides)
     table["first"][1:] = table["end"][:-1]
     table["first_triangle"] = table["end"] - np.diff(ends(single), prepend=0)
-    table["solid_end"] = ends(sides) // SIDES
-    table["first_solid"][1:] = table["solid_end"][:-1]
+    table["parallelepiped_end"] = ends(sides) // SIDES
+    table["first_parallelepiped"][1:] = table["parallelepiped_end"][:-1]
     parallelepipeds = parallelepipeds[np.argsort(number[sides][::SIDES], kind="stable")]
     parallelepipeds["first_side"] = np.count_nonzero(~sides) + SIDES * np.arange(len(parallelepipeds))
     return BruteForceTables(rows[order], parallelepipeds, table)
@@ -134,7 +136,7 @@ def _rows(
 
     turns = np.concatenate([quads.turns for quads in own])
     along = np.concatenate([quads.along for quads in own])
-    rows = np.zeros(sum(counts), layout.FACET)
+    rows = np.zeros(sum(counts), layout.QUAD)
     corners = (
         np.concatenate([quads.corners for quads in own]) + each([p.first_vertex for p in parts])[:, None]
     )
@@ -161,7 +163,7 @@ def _parallelepipeds(
     regular = np.linalg.det(axes) != 0
     axes[~regular] = np.eye(3)
     inverse = np.linalg.inv(axes).transpose(0, 2, 1)
-    rows = np.zeros(len(corners), layout.SOLID)
+    rows = np.zeros(len(corners), layout.PARALLELEPIPED)
     rows["corner"], rows["local_from_world"] = corners[:, 0], inverse.reshape(-1, 9)
     steepest = np.sqrt((inverse**2).sum(axis=2).max(axis=1, initial=0.0))
     return rows, regular & (steepest * np.abs(vertices).max() * _LEAST_HEIGHT < 1)

@@ -124,7 +124,7 @@ class PathPlane(IntEnum):
 class ShadowPlane(IntEnum):
     """Planes of the shadow ray of a path and of the radiance that it brings when nothing is in its way.
 
-    `illuminate` leaves a light sample in them: direction, distance, radiance of the light, and PDF, the
+    `sample_lights` leaves a light sample in them: direction, distance, radiance of the light, and PDF, the
     solid-angle density of the direction; shading turns the radiance into what the path gains.
     """
 
@@ -176,7 +176,7 @@ class PathClass(IntFlag):
     SHADOW = 2
     SURFACE = 4
     MEDIUM = 8
-    ESCAPED = 16
+    MISS = 16
 
 
 class SlotFlag(IntFlag):
@@ -223,7 +223,7 @@ TRIANGLE_PACK = _packed(
     ]
 )
 
-FACET = _packed(
+QUAD = _packed(
     [
         # A parallelogram or a triangle in world space: corners A, B, C, D on the way around, x, y and z of
         # each. A triangle has C in place of D.
@@ -237,7 +237,7 @@ FACET = _packed(
     ]
 )
 
-SOLID = _packed(
+PARALLELEPIPED = _packed(
     [
         # A parallelepiped in world space. Its local coordinates are between 0 and 1 inside.
         ("corner", np.float32, (3,)),
@@ -251,8 +251,8 @@ CLUSTER = _packed(
         # Facets that stand together: least and greatest x, y and z; parallelepipeds; parallelograms, then
         # triangles.
         ("bounds", np.float32, (6,)),
-        ("first_solid", np.uint32),
-        ("solid_end", np.uint32),
+        ("first_parallelepiped", np.uint32),
+        ("parallelepiped_end", np.uint32),
         ("first", np.uint32),
         ("first_triangle", np.uint32),
         ("end", np.uint32),
@@ -342,8 +342,8 @@ PARAMS = _packed(
 STRUCTS: dict[str, np.dtype[np.void]] = {
     "Node": NODE,
     "TrianglePack": TRIANGLE_PACK,
-    "Facet": FACET,
-    "Solid": SOLID,
+    "Quad": QUAD,
+    "Parallelepiped": PARALLELEPIPED,
     "Cluster": CLUSTER,
     "Object": OBJECT,
     "Material": MATERIAL,

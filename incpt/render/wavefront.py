@@ -50,7 +50,7 @@ def block_arguments(scene: SceneTables) -> list[Any]:
     memory = [cl.LocalMemory(4 * n * layout.BLOCK_STRIDE) for n in _BLOCK_PLANES]
     return [
         scene.buffer("block_nodes"), *scene.geometry[1:], scene.buffer("normals"), scene.buffer("layers"),
-        *scene.emitters, *memory, *map(scene.buffer, ("facets", "solids", "clusters")),
+        *scene.emitters, *memory, *map(scene.buffer, ("quads", "parallelepipeds", "clusters")),
         np.uint32(scene.cluster_count),
     ]  # fmt: skip
 
@@ -192,7 +192,7 @@ class Wavefront:
             count,
             self._live,
             (_Class.SURFACE, self._surfaces),
-            (_Class.ESCAPED, self._escaped),
+            (_Class.MISS, self._escaped),
             (_Class.MEDIUM, self._media),
         )
         if escaped_count and any(scene.environment_radiance):

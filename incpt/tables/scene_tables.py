@@ -68,12 +68,12 @@ class SceneTables:
         materials, top_level = self.materials, self.top_level
         names = {
             "MEDIA": materials.has_media,
-            "ALL_ON_TOP": top_level.all_in_world_space,
+            "TOP_LEVEL_ONLY": top_level.all_in_world_space,
             "FLAT": self._is_flat,
             "SMOOTH_MEDIA": materials.has_media and materials.is_media_smooth,
             "CLEAR_MEDIA": materials.has_media and materials.is_media_clear,
-            "MATT": materials.is_matt,
-            "FEW_ON_TOP": top_level.is_brute_force,
+            "MATTE": materials.is_matt,
+            "BRUTE_FORCE": top_level.is_brute_force,
         }
         return (*self.features, *(name for name, holds in names.items() if holds))
 

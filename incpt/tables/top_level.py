@@ -57,8 +57,8 @@ def top_level_tables(device: Device, table: ObjectTable, quads_of: Callable[[Mes
         "top_nodes": nodes,
         "block_nodes": other_nodes,
         "top_packs": _upload(device, packs),
-        "facets": _upload(device, brute_force.quads),
-        "solids": _upload(device, brute_force.parallelepipeds),
+        "quads": _upload(device, brute_force.quads),
+        "parallelepipeds": _upload(device, brute_force.parallelepipeds),
         "clusters": device.upload(brute_force.clusters),
     }
     return TopLevelTables(buffers, len(others) == 0, found is not None, len(brute_force.clusters))

@@ -435,7 +435,7 @@ def test_shadow_rays_end_before_their_distance(device: Device) -> None:
 def test_classes_of_paths(device: Device) -> None:
     origins = np.tile(np.float32([0.1, 2, 0.2]), (2, 1))
     directions = np.float32([[0, -1, 0], [0, 1, 0]])
-    surface, medium, escaped = PathClass.SURFACE, PathClass.MEDIUM, PathClass.ESCAPED
+    surface, medium, escaped = PathClass.SURFACE, PathClass.MEDIUM, PathClass.MISS
     objects = [as_object(shapes.shape("plane"))]
     glass = World(device, objects, material_flags=layout.MaterialFlag.TRANSMISSIVE)
     diffuse = World(device, objects)

@@ -206,10 +206,14 @@ def described(device: Device, scene: Scene) -> SceneTables:
 
 
 def arranged(device: Device, scene: Scene) -> dict[str, npt.NDArray[np.void]]:
-    """FACET, SOLID and CLUSTER as they are on the device."""
+    """QUAD, PARALLELEPIPED and CLUSTER as they are on the device."""
     tables = described(device, scene)
     found = {}
-    for name, dtype in (("facets", layout.FACET), ("solids", layout.SOLID), ("clusters", layout.CLUSTER)):
+    for name, dtype in (
+        ("quads", layout.QUAD),
+        ("parallelepipeds", layout.PARALLELEPIPED),
+        ("clusters", layout.CLUSTER),
+    ):
         buffer = tables.buffer(name)
         found[name] = device.read(buffer, np.empty(buffer.size // dtype.itemsize, dtype))
     assert tables.cluster_count == len(found["clusters"])
@@ -217,14 +221,17 @@ def arranged(device: Device, scene: Scene) -> dict[str, npt.NDArray[np.void]]:
 
 
 def check_tables(tables: dict[str, npt.NDArray[np.void]], loose: int, parallelepipeds: int) -> None:
-    rows, table = tables["facets"], tables["clusters"]
+    rows, table = tables["quads"], tables["clusters"]
     assert len(table) <= clusters.MOST_CLUSTERS
-    for first, end, count in (("first", "end", loose), ("first_solid", "solid_end", parallelepipeds)):
+    for first, end, count in (
+        ("first", "end", loose),
+        ("first_parallelepiped", "parallelepiped_end", parallelepipeds),
+    ):
         assert table[first].tolist() == [0, *table[end][:-1].tolist()] and table[end][-1] == count
-    assert tables["solids"]["first_side"][:parallelepipeds].tolist() == [
+    assert tables["parallelepipeds"]["first_side"][:parallelepipeds].tolist() == [
         loose + 6 * i for i in range(parallelepipeds)
     ]
-    for body in tables["solids"][:parallelepipeds]:
+    for body in tables["parallelepipeds"][:parallelepipeds]:
         away = rows["vertex"][body["first_side"] : body["first_side"] + 6].reshape(6, 4, 3) - body["corner"]
         local = away @ body["local_from_world"].reshape(3, 3).T
         for side in range(6):
@@ -235,7 +242,9 @@ def check_tables(tables: dict[str, npt.NDArray[np.void]], loose: int, parallelep
         np.testing.assert_array_equal(single, np.arange(first, end) >= middle)
         sides = [
             rows["vertex"][side : side + 6]
-            for side in tables["solids"]["first_side"][cluster["first_solid"] : cluster["solid_end"]]
+            for side in tables["parallelepipeds"]["first_side"][
+                cluster["first_parallelepiped"] : cluster["parallelepiped_end"]
+            ]
         ]
         corners = np.concatenate([rows["vertex"][first:end], *sides]).reshape(-1, 3)
         if i < len(table) - 1:
@@ -255,10 +264,10 @@ def test_every_quad_is_in_a_cluster(device: Device, planes: int, cubes: int, alo
         for i, mesh in enumerate(meshes)
     ]
     scene = scene_of(objects)
-    if "FEW_ON_TOP" not in described(device, scene).variant:
+    if "BRUTE_FORCE" not in described(device, scene).variant:
         return
     tables = arranged(device, scene)
-    assert len(tables["facets"]) == planes + 6 * cubes + alone
+    assert len(tables["quads"]) == planes + 6 * cubes + alone
     check_tables(tables, planes + alone, cubes)
 
 
@@ -273,7 +282,7 @@ def test_parallelepipeds_stand_in_the_order_of_their_clusters(device: Device) ->
     bricks = [Object(f"{i}", shape("cube"), "white", (i, 0, 0), (0, 9 * i, 0), (0.3,) * 3) for i in (-2, 2)]
     tables = arranged(device, scene_of([room, *bricks]))
     check_tables(tables, 0, 3)
-    assert tables["clusters"]["solid_end"].tolist() == [1, 2, 3]
+    assert tables["clusters"]["parallelepiped_end"].tolist() == [1, 2, 3]
 
 
 def test_small_bodies_get_boxes_and_walls_do_not(device: Device) -> None:
@@ -281,7 +290,7 @@ def test_small_bodies_get_boxes_and_walls_do_not(device: Device) -> None:
              Object("wall", shape("plane"), "white", (0, 2, -2), (90, 0, 0), (4, 1, 4))]  # fmt: skip
     bodies = [Object(f"{i}", shape("cube"), "white", (i, 0.2, 0), scale=(0.3,) * 3) for i in (-1, 1)]
     table = arranged(device, scene_of(walls + bodies))["clusters"]
-    assert table["solid_end"].tolist() == [1, 2, 2] and table["end"].tolist() == [0, 0, 2]
+    assert table["parallelepiped_end"].tolist() == [1, 2, 2] and table["end"].tolist() == [0, 0, 2]
 
 
 def test_faces_without_area_are_left_out(device: Device) -> None:
@@ -307,10 +316,10 @@ hits_of_rays(const uint count, __global const float *given, BLOCK_PARAMETERS, __
     }
     for (uint i = 0; i < size; i++)
         ((__global uint *)planes)[HIT_OBJECT * count + first + i] = NO_INDEX;
-    Ends ends;
-    tell_apart(&block, trace_rays(&block, size, true), &ends);
-    const uint hit_count = gather_hits(&block, &ends);
-    describe_hits(&block, hit_count);
+    RayEnds ends;
+    sort_by_ends(&block, trace_rays(&block, size, true), &ends);
+    const uint hit_count = compact_hits(&block, &ends);
+    setup_surfaces(&block, hit_count);
     for (uint p = 0; p < HIT_PLANES; p++)
         for (uint i = 0; i < hit_count; i++)
             planes[p * count + first + block.results[i]] = block.state.hits[p * BLOCK_STRIDE + i];
@@ -321,8 +330,8 @@ hits_of_rays(const uint count, __global const float *given, BLOCK_PARAMETERS, __
 def hits(device: Device, scene: Scene, rays: Floats, by_brute_force: bool) -> Floats:
     """(HIT_PLANES, N) of what `rays` (6, N) meet, by brute force or by the way of trees."""
     tables = described(device, scene)
-    assert "FEW_ON_TOP" in tables.variant
-    features = tuple(name for name in tables.variant if by_brute_force or name != "FEW_ON_TOP")
+    assert "BRUTE_FORCE" in tables.variant
+    features = tuple(name for name in tables.variant if by_brute_force or name != "BRUTE_FORCE")
     arguments = block_arguments(tables)
     if not by_brute_force:
         arguments[0] = tables.buffer("top_nodes")
@@ -509,11 +518,11 @@ def test_what_is_quicker_by_a_tree_is_not_done_by_brute_force(
     device: Device, count: int, mesh: Mesh | None, by_brute_force: bool
 ) -> None:
     variant = described(device, crowd(count, mesh)).variant
-    assert "ALL_ON_TOP" in variant and ("FEW_ON_TOP" in variant) == by_brute_force
+    assert "TOP_LEVEL_ONLY" in variant and ("BRUTE_FORCE" in variant) == by_brute_force
 
 
 def test_dear_clusters_are_not_done_by_brute_force(device: Device) -> None:
     """Few enough quads, but nearly all rays would meet all of them."""
     nest = Object("nest", soup(100, 3), "white")
-    assert "FEW_ON_TOP" not in described(device, scene_of([nest])).variant
-    assert "FEW_ON_TOP" in described(device, scene_of([replace(nest, mesh=soup(30, 3))])).variant
+    assert "BRUTE_FORCE" not in described(device, scene_of([nest])).variant
+    assert "BRUTE_FORCE" in described(device, scene_of([replace(nest, mesh=soup(30, 3))])).variant

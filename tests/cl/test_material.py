@@ -240,10 +240,10 @@ def test_variant_for_matt_scenes_is_the_same(name: str, angle_deg: float) -> Non
     material, wo = MATERIALS[name], wo_at(angle_deg)
     u, v = uniforms(COUNT // 16, 2, 5)
     wi = direction(np.arccos(1 - 2 * u), 2 * np.pi * v)
-    for general, matt in zip(evaluate(material, wo, wi), evaluate(material, wo, wi, ("MATT",)), strict=True):
+    for general, matt in zip(evaluate(material, wo, wi), evaluate(material, wo, wi, ("MATTE",)), strict=True):
         assert matt.any() == (angle_deg < 90)
         np.testing.assert_allclose(matt, general, rtol=1e-5, atol=1e-7)
     if angle_deg < 90:
-        pairs = zip(sample(material, wo, 4096), sample(material, wo, 4096, features=("MATT",)), strict=True)
+        pairs = zip(sample(material, wo, 4096), sample(material, wo, 4096, features=("MATTE",)), strict=True)
         for general, matt in pairs:
             np.testing.assert_allclose(matt, general, rtol=1e-4, atol=1e-6)

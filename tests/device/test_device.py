@@ -209,13 +209,13 @@ def test_blocks_are_the_same_without_instructions_of_avx512(
 def test_variant_for_matt_scenes_follows_materials(device: Device) -> None:
     box = cornell()
     session = Session(box, size=(8, 8), device=device)
-    assert "MATT" in session._tables.variant
+    assert "MATTE" in session._tables.variant
     clear = Material(transmission=1.0)  # opaque never, so that its layer does not count
     session.edit(Scene(box.camera, box.environment, {**box.materials, "clear": clear}, box.objects))
-    assert "MATT" in session._tables.variant
+    assert "MATTE" in session._tables.variant
     for change in ({"specular": 0.5}, {"metallic": 1.0}, {"specular": 1.0, "transmission": 0.5}):
         session.edit(box.with_material("white", **change))
-        assert "MATT" not in session._tables.variant
+        assert "MATTE" not in session._tables.variant
 
 
 def test_variant_for_clear_media_follows_absorption(device: Device) -> None:
@@ -246,12 +246,12 @@ def test_devices_agree(device: Device) -> None:
 
 
 LIGHTS = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS")
-RESTRICTIONS = ("ALL_ON_TOP", "FEW_ON_TOP", "FLAT", "SMOOTH_MEDIA")
+RESTRICTIONS = ("TOP_LEVEL_ONLY", "BRUTE_FORCE", "FLAT", "SMOOTH_MEDIA")
 VARIANTS = [
     *(lights + media for lights in ((), LIGHTS[:1], LIGHTS[1:], LIGHTS) for media in ((), ("MEDIA",))),
     ("MEDIA", *RESTRICTIONS),
-    (*LIGHTS, "MEDIA", "MATT", "CLEAR_MEDIA"),
-    (*LIGHTS, *RESTRICTIONS[:3], "MATT"),
+    (*LIGHTS, "MEDIA", "MATTE", "CLEAR_MEDIA"),
+    (*LIGHTS, *RESTRICTIONS[:3], "MATTE"),
     (*LIGHTS, "MEDIA", *RESTRICTIONS),
     (*LIGHTS, *RESTRICTIONS[:3]),
     (*LIGHTS, *RESTRICTIONS[1:2]),

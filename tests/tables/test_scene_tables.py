@@ -105,7 +105,7 @@ SKIES = (
     Image(np.linspace(0, 1, 96, dtype=np.float32).reshape(4, 8, 3)),
 )
 NAMES = (
-    "top_nodes", "block_nodes", "top_packs", "facets", "solids", "clusters", "materials", "layers",
+    "top_nodes", "block_nodes", "top_packs", "quads", "parallelepipeds", "clusters", "materials", "layers",
     "environment_image", "marginal", "conditional", "texel_pdf",
 )  # fmt: skip
 """The buffers but for those of meshes, and lights, whose order tells which came first."""
@@ -255,7 +255,7 @@ def test_a_black_image_is_no_light(device: Device) -> None:
 
 def test_beside_brute_force_the_tree_holds_the_other_objects(device: Device) -> None:
     tables = tables_of(GeometryPool(device), scene_of([placed("cube", 0), placed("ball", 2)]))
-    assert "FEW_ON_TOP" in tables.variant and tables.has_trees
+    assert "BRUTE_FORCE" in tables.variant and tables.has_trees
     for name, has_packs in (("top_nodes", True), ("block_nodes", False)):
         child = read(tables, name).view(layout.NODE)["child"]
         leaves = child[(child >= layout.NODE_LEAF) & (child != layout.NODE_EMPTY)] & ~np.uint32(
