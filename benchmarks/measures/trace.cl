@@ -1,46 +1,43 @@
-// Traversal alone: no more is read and written than a ray and its distance. `rays` holds origin and direction
-// in six planes; a limit of infinity asks for whatever is nearest. Included after bvh.cl, or after
-// trace_blocks.cl where that is what traces.
+// Traversal alone: no more is read and written than a ray and its distance. `given` holds origins and
+// directions in six planes; a limit of infinity asks for whatever is nearest. The text follows that of
+// bvh.cl, or that of trace_blocks.cl where blocks trace.
 
 #ifdef BLOCKS
 
-// A block of rays, in the planes of state where paths have theirs.
+// Puts a block of rays where the rays of paths stand, or where their shadow rays do.
 STAGE void load_rays(const Block *block, __local float *planes, uint path_class, uint first, uint size,
                      uint count, __global const float *given) {
-    for (uint p = 0; p < 6; p++)
+    for (uint p = 0; p < RAY_PLANES; p++)
         for (uint i = 0; i < size; i++)
             planes[p * BLOCK_STRIDE + i] = given[p * count + first + i];
     for (uint i = 0; i < size; i++) {
-        store_bits(block->state.paths, PATH_CLASS * BLOCK_STRIDE + i, path_class);
-        block->results[i] = i;
+        store_class(&block->state, i, path_class);
+        store_result(&block->state, i, i);
     }
 }
 
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
-trace_closest(const uint count, __global const float *given, __global const float *limits, BLOCK_PARAMETERS,
-              __global float *distances, const uint from_camera) {
-    Block block = BLOCK(0, 0);
+trace_closest(RAYS_PARAMETERS, BLOCK_PARAMETERS, DISTANCES_PARAMETERS) {
+    const Block block = BLOCK_OF(0, 0);
     const uint first = (uint)get_group_id(0) * BLOCK_PATHS, size = MIN(count - first, BLOCK_PATHS);
     load_rays(&block, block.state.rays, CLASS_LIVE, first, size, count, given);
     trace_rays(&block, size, from_camera != 0);
     for (uint i = 0; i < size; i++) {
-        const uint met = load_bits(block.state.hits, HIT_OBJECT * BLOCK_STRIDE + i) != NO_INDEX;
-        distances[first + block.results[i]] =
-            met ? block.state.hits[HIT_DISTANCE * BLOCK_STRIDE + i] : INFINITY;
+        const RawHit hit = load_raw_hit(&block, i);
+        distances[first + load_result(&block.traced, i)] = hit.object == NO_INDEX ? INFINITY : hit.distance;
     }
 }
 
 // 1 where something is nearer than the limit, else 0.
-__kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
-trace_any(const uint count, __global const float *given, __global const float *limits, BLOCK_PARAMETERS,
-          __global float *distances) {
-    Block block = BLOCK(0, 0);
+__kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void trace_any(RAYS_PARAMETERS, BLOCK_PARAMETERS,
+                                                                            DISTANCES_PARAMETERS) {
+    const Block block = BLOCK_OF(0, 0);
     const uint first = (uint)get_group_id(0) * BLOCK_PATHS, size = MIN(count - first, BLOCK_PATHS);
     const State *state = &block.state;
     load_rays(&block, state->shadows, CLASS_SHADOW, first, size, count, given);
     for (uint i = 0; i < size; i++) {
         state->shadows[SHADOW_DISTANCE * BLOCK_STRIDE + i] = limits[first + i];
-        store3(state->shadows + SHADOW_RADIANCE_R * BLOCK_STRIDE, BLOCK_STRIDE, i, vec3(1.0f, 1.0f, 1.0f));
+        store_arriving(state, i, vec3(1.0f, 1.0f, 1.0f));
         store3(state->radiance, BLOCK_STRIDE, i, vec3(0.0f, 0.0f, 0.0f));
     }
     trace_shadows(&block, size);
@@ -50,61 +47,51 @@ trace_any(const uint count, __global const float *given, __global const float *l
 
 #else
 
-#define GEOMETRY_PARAMETERS                                                                                  \
-    __global const Node *top_nodes, __global const TrianglePack *top_packs, __global const Node *nodes,      \
-        __global const TrianglePack *packs, __global const Object *objects
-#define GEOMETRY top_nodes, top_packs, nodes, packs, objects
-
-INLINE bool trace_one(uint k, uint count, __global const float *rays, GEOMETRY_PARAMETERS, const bool any,
-                      BvhHit *hit) {
-    const Geometry geometry = {GEOMETRY, 0};
-    const Vec3 origin = vec3(rays[k], rays[count + k], rays[2 * count + k]);
-    const Vec3 direction = vec3(rays[3 * count + k], rays[4 * count + k], rays[5 * count + k]);
-    return bvh_trace(&geometry, origin, direction, any, hit);
+INLINE Ray given_ray(uint k, uint count, __global const float *given) {
+    Ray ray;
+    ray.origin = vec3(given[k], given[count + k], given[2 * count + k]);
+    ray.direction = vec3(given[3 * count + k], given[4 * count + k], given[5 * count + k]);
+    return ray;
 }
 
-__kernel __attribute__((vec_type_hint(float8))) void
-trace_closest(const uint count, __global const float *rays, __global const float *limits, GEOMETRY_PARAMETERS,
-              __global float *distances) {
+__kernel __attribute__((vec_type_hint(float8))) void trace_closest(RAYS_PARAMETERS, GEOMETRY_PARAMETERS,
+                                                                   DISTANCES_PARAMETERS) {
     const uint k = (uint)get_global_id(0);
     if (k >= count)
         return;
-    BvhHit hit;
-    hit.distance = limits[k];
-    const bool found = trace_one(k, count, rays, GEOMETRY, false, &hit);
-    distances[k] = found ? hit.distance : INFINITY;
+    const Geometry geometry = {GEOMETRY_ARGUMENTS};
+    RawHit hit;
+    distances[k] =
+        bvh_nearest(&geometry, given_ray(k, count, given), limits[k], &hit) ? hit.distance : INFINITY;
 }
 
 // 1 where something is nearer than the limit, else 0.
-__kernel __attribute__((vec_type_hint(float8))) void trace_any(const uint count, __global const float *rays,
-                                                               __global const float *limits,
-                                                               GEOMETRY_PARAMETERS,
-                                                               __global float *distances) {
+__kernel __attribute__((vec_type_hint(float8))) void trace_any(RAYS_PARAMETERS, GEOMETRY_PARAMETERS,
+                                                               DISTANCES_PARAMETERS) {
     const uint k = (uint)get_global_id(0);
     if (k >= count)
         return;
-    BvhHit hit;
-    hit.distance = limits[k];
-    distances[k] = trace_one(k, count, rays, GEOMETRY, true, &hit) ? 1.0f : 0.0f;
+    const Geometry geometry = {GEOMETRY_ARGUMENTS};
+    distances[k] = bvh_any(&geometry, given_ray(k, count, given), limits[k]) ? 1.0f : 0.0f;
 }
 
 #ifdef COUNT_VISITS
 // How many nodes (of both levels) and packs of triangles each ray is tested against.
-__kernel __attribute__((vec_type_hint(float8))) void
-count_visits(const uint count, const uint any, __global const float *rays, __global const float *limits,
-             GEOMETRY_PARAMETERS, __global uint *visits) {
+__kernel __attribute__((vec_type_hint(float8))) void count_visits(RAYS_PARAMETERS, GEOMETRY_PARAMETERS,
+                                                                  VISITS_PARAMETERS) {
     const uint k = (uint)get_global_id(0);
     if (k >= count)
         return;
-    BvhHit hit;
+    const Geometry geometry = {GEOMETRY_ARGUMENTS};
+    RawHit hit;
     hit.distance = limits[k];
-    hit.visits = hit.tests = 0;
-    if (any)
-        trace_one(k, count, rays, GEOMETRY, true, &hit);
+    hit.visited_nodes = hit.visited_packs = 0;
+    if (any_hit)
+        bvh_trace(&geometry, given_ray(k, count, given), true, &hit);
     else
-        trace_one(k, count, rays, GEOMETRY, false, &hit);
-    visits[2 * k] = hit.visits;
-    visits[2 * k + 1] = hit.tests;
+        bvh_trace(&geometry, given_ray(k, count, given), false, &hit);
+    visits[2 * k] = hit.visited_nodes;
+    visits[2 * k + 1] = hit.visited_packs;
 }
 #endif
 

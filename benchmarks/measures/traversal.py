@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -15,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
-from incpt.core import affine, layout
+from incpt.core import affine, bindings, layout
 from incpt.device.device import Device
-from incpt.render.wavefront import block_arguments, traces_in_blocks
+from incpt.render import blocks
 from incpt.scene.camera import Camera
 from incpt.scene.model import Scene
 from incpt.tables.geometry_pool import GeometryPool
@@ -26,6 +25,24 @@ from incpt.tables.scene_tables import tables_of
 Floats = npt.NDArray[np.float32]
 
 _FARTHEST = 1e30
+
+_RAYS = bindings.Group(
+    "RAYS",
+    None,
+    (
+        bindings.Argument("count", "uint", "rays"),
+        bindings.Argument("given", "__global const float *", "origins and directions, six planes"),
+        bindings.Argument("limits", "__global const float *", "how far each ray looks"),
+        bindings.Argument("any_hit", "uint", "1: any hit will do, 0: the nearest is asked for"),
+        bindings.Argument("from_camera", "uint", "1: neighbours go much the same way"),
+    ),
+)
+_DISTANCES = bindings.Group(
+    "DISTANCES", None, (bindings.Argument("distances", "__global float *", "what was found, by ray"),)
+)
+_VISITS = bindings.Group(
+    "VISITS", None, (bindings.Argument("visits", "__global uint *", "nodes and packs tested, by ray"),)
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,16 +78,17 @@ class Tracer:
         # The buffers hold the scene as long as its tables live.
         self._tables = tables_of(GeometryPool.of(device), scene)
         self.in_squares = self._tables.has_trees
-        self._buffers = self._tables.geometry[:5]
-        self._in_blocks = traces_in_blocks(device) if in_blocks is None else in_blocks
-        self._arguments = block_arguments(self._tables) if self._in_blocks else self._buffers
-        own = (resources.files("incpt.benchmarks") / "measures/trace.cl").read_text("utf-8")
+        self._in_blocks = blocks.traces_in_blocks(device) if in_blocks is None else in_blocks
         file, features = ("trace_blocks", self._tables.variant) if self._in_blocks else ("bvh", ())
-        program = device.build(f"{device.program_text(file, features)}\n{own}", "measures/trace.cl")
+        program = self._build(file, features)
         self._kernels = {name: cl.Kernel(program, name) for name in ("trace_closest", "trace_any")}
-        text = counting_source(device.program_text("bvh"))
-        counting = device.build(f"#define COUNT_VISITS\n{text}\n{own}", "measures/trace.cl")
-        self._count = cl.Kernel(counting, "count_visits")
+        self._count = cl.Kernel(self._build("bvh", ("COUNT_VISITS",)), "count_visits")
+
+    def _build(self, file: str, features: tuple[str, ...]) -> cl.Program:
+        own = (resources.files("incpt.benchmarks") / "measures/trace.cl").read_text("utf-8")
+        groups = bindings.c_header((_RAYS, _DISTANCES, _VISITS))
+        text = self.device.program_text(file, features)
+        return self.device.build(f"{text}\n{groups}\n{own}", "measures/trace.cl")
 
     def place(self, rays: Rays) -> PlacedRays:
         """Rays on the device."""
@@ -81,10 +99,12 @@ class Tracer:
         through the trees alone and nearer boxes first."""
         count = len(rays)
         buffer = self.device.empty(8 * count)
-        placed = [self.device.upload(rays.planes), self.device.upload(rays.limits)]
-        self.device.launch(
-            self._count, count, np.uint32(count), np.uint32(rays.any_hit), *placed, *self._buffers, buffer
-        )
+        values = {
+            **_ray_values(rays, self.device.upload(rays.planes), self.device.upload(rays.limits)),
+            "visits": buffer,
+        }
+        groups = (_RAYS, bindings.GEOMETRY, _VISITS)
+        self.device.launch(self._count, count, *bindings.arguments(groups, values, self._tables))
         found = self.device.read(buffer, np.empty((count, 2), np.uint32))
         nodes, packs = found.mean(axis=0).tolist()
         return nodes, packs
@@ -93,12 +113,15 @@ class Tracer:
         """Trace; returns before it is done."""
         count = len(placed.rays)
         kernel = self._kernels["trace_any" if placed.rays.any_hit else "trace_closest"]
-        arguments = np.uint32(count), placed.planes, placed.limits, *self._arguments, placed.distances
+        values = {
+            **_ray_values(placed.rays, placed.planes, placed.limits),
+            "distances": placed.distances,
+        }
         if self._in_blocks:
-            if not placed.rays.any_hit:
-                arguments = *arguments, np.uint32(placed.rays.from_camera)
-            self.device.launch(kernel, -(-count // layout.BLOCK_PATHS), *arguments, work_group=1)
+            groups = (_RAYS, *bindings.BLOCK, _DISTANCES)
+            blocks.launch(self.device, kernel, groups, count, values, self._tables)
         else:
+            arguments = bindings.arguments((_RAYS, bindings.GEOMETRY, _DISTANCES), values, self._tables)
             self.device.launch(kernel, count, *arguments)
 
 
@@ -170,22 +193,15 @@ class EmbreeTracer:
         return list(self._pool.map(part, range(self._threads)))
 
 
-def counting_source(text: str) -> str:
-    """cl/bvh.cl with counters in its hits, which its tests of boxes and triangles raise.
-
-    The kernels that are timed are built of the text as it is.
-    """
-    counted, fields = re.subn(r"\n\} BvhHit;", "\n    uint visits;\n    uint tests;\n} BvhHit;", text)
-    macros = (
-        "#define bvh_boxes(ray, node, limit, entry) (hit->visits++, bvh_boxes(ray, node, limit, entry))\n"
-        "#define bvh_triangles(ray, pack, limit, t, weight) "
-        "(hit->tests++, bvh_triangles(ray, pack, limit, t, weight))\n"
-    )
-    counted, places = re.subn(
-        r"\n(?=[^\n]*\bbvh_trace_mesh\(const)", lambda m: "\n" + macros, counted, count=1
-    )
-    assert (fields, places) == (1, 1), "cl/bvh.cl no longer has BvhHit and bvh_trace_mesh as this expects"
-    return counted
+def _ray_values(rays: Rays, planes: cl.Buffer, limits: cl.Buffer) -> dict[str, Any]:
+    """What the arguments of _RAYS are bound to."""
+    return {
+        "count": len(rays),
+        "given": planes,
+        "limits": limits,
+        "any_hit": rays.any_hit,
+        "from_camera": rays.from_camera,
+    }
 
 
 # ------------------------------------------------------------------------------------------ ray sets

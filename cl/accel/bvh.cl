@@ -7,18 +7,13 @@
 // Box tests err on the side of a hit (Ize 2013, "Robust BVH Ray Traversal"): should huge coordinates along a
 // zero direction overflow to NaN, the order of operands in BVH_MIN8 and BVH_MAX8 drops that axis.
 
-#include "base/scalar.cl"
+#include "accel/slab.cl"
 
 #define BVH_STACK_SIZE ((BVH_WIDTH - 1) * BVH_MAX_DEPTH + 1)
 #define BVH_TOP_STACK_SIZE (2 * BVH_STACK_SIZE) // a tree of objects may go on as one of triangles
 #define BVH_PLANE_BYTES (BVH_WIDTH * sizeof(float))
 #define BVH_MIN8(a, b) ((a) < (b) ? (a) : (b))
 #define BVH_MAX8(a, b) ((a) > (b) ? (a) : (b))
-// Rounding errors of the box test, relative: several ulps, because compilers may or may not fuse.
-#define BVH_SLACK 4e-7f
-// Direction components below this count as zero; their reciprocal stays finite, so that no NaN can arise.
-#define BVH_ZERO 1e-20f
-#define BVH_INVERSE_ZERO 1e25f
 
 // Inlined by force, and with the compiler's own bit operations where it has them: in PoCL a call in the inner
 // loop spills every vector register.
@@ -32,39 +27,37 @@
 #define BVH_LIKELY(x) (x)
 #endif
 
-// Everything that rays can meet: the top level over objects and over the triangles of small meshes, which lie
-// in its packs in world space, and the trees and packs of the other meshes, one after the other.
-typedef struct {
-    __global const Node *top_nodes;
-    __global const TrianglePack *top_packs;
-    __global const Node *nodes;
-    __global const TrianglePack *packs;
-    __global const Object *objects;
-    __global const float *normals; // of the corners of faces, mesh by mesh; for `setup_surface_path` alone
-} Geometry;
-
-// What the box test needs of a ray along one axis: distance to a plane = plane * inverse + shift, shifted so
-// that rounding errs on the side of a hit.
-typedef struct {
-    float inverse, near_shift, far_shift;
-} BvhSlab;
+// `Geometry` (core/bindings.py) is everything that rays can meet: the top level over objects and over the
+// triangles of small meshes, which lie in its packs in world space, and the trees and packs of the other
+// meshes.
 
 // A ray in the space of one tree, prepared for its tests. Axis z of the triangle test is the direction's
 // largest, x and y are the other two.
 typedef struct {
-    BvhSlab slab[3];
+    Slab slab[3];
     size_t near_plane[3]; // offset in a node, bytes
     size_t axis[3];       // x, y and z of the triangle test, as offsets in a pack, bytes
     float origin[3];      // along these
     float shear[3];
 } BvhRay;
 
+// The nearest hit so far. Only its distance has a meaning where `object` is NO_INDEX.
 typedef struct {
-    float distance;
+    float distance; // along the ray
     uint object;
-    uint triangle;   // its place: pack, counted from the first of the object, times BVH_WIDTH, and lane
+    uint triangle;   // its place, see PLACE_PACK
     float weight[3]; // of the corners, up to a common factor
-} BvhHit;
+#ifdef COUNT_VISITS
+    uint visited_nodes, visited_packs;
+#endif
+} RawHit;
+
+// Counts a node or a pack that a ray is tested against, where the benchmark of rays asks for it.
+#ifdef COUNT_VISITS
+#define COUNT_VISIT(hit, counter) ((hit)->counter++)
+#else
+#define COUNT_VISIT(hit, counter)
+#endif
 
 // Bit i is set where lane i of a comparison holds.
 INLINE uint bvh_lanes(const int8 comparison) {
@@ -78,19 +71,6 @@ INLINE uint bvh_lanes(const int8 comparison) {
 #endif
 }
 
-INLINE BvhSlab bvh_slab(float origin, float direction) {
-    const int zero = FABS(direction) < BVH_ZERO;
-    const float least = as_float((as_uint(direction) & 0x80000000u) | as_uint(1.0f / BVH_INVERSE_ZERO));
-    BvhSlab slab;
-    slab.inverse = 1.0f / (zero ? least : direction);
-    const float shift = -origin * slab.inverse;
-    // Without a direction the ray lies between the planes or not; on a plane it counts as between.
-    const float slack = FABS(shift) * BVH_SLACK + (zero ? BVH_INVERSE_ZERO * 1e-10f : 0.0f);
-    slab.near_shift = shift - slack;
-    slab.far_shift = shift + slack;
-    return slab;
-}
-
 // The largest component of a direction, and the other two, which are x and y of the triangle test.
 INLINE uint bvh_main_axis(Vec3 direction) {
     const float x = FABS(direction.x), y = FABS(direction.y), z = FABS(direction.z);
@@ -99,7 +79,7 @@ INLINE uint bvh_main_axis(Vec3 direction) {
 INLINE uint bvh_x_axis(uint main) { return main == 2u ? 0u : main + 1u; }
 INLINE uint bvh_y_axis(uint main) { return main == 0u ? 2u : main - 1u; }
 
-INLINE float bvh_component(Vec3 v, uint axis) { return axis == 0u ? v.x : axis == 1u ? v.y : v.z; }
+INLINE float component(Vec3 v, uint axis) { return axis == 0u ? v.x : axis == 1u ? v.y : v.z; }
 
 // Bit i: the direction is negative along axis i.
 INLINE uint bvh_octant(Vec3 direction) {
@@ -116,19 +96,20 @@ INLINE void bvh_point(BvhRay *ray, uint octant, uint main) {
     ray->axis[2] = main * BVH_PLANE_BYTES;
 }
 
-INLINE BvhRay bvh_ray(Vec3 origin, Vec3 direction) {
+INLINE BvhRay bvh_ray(Ray world_or_local) {
+    const Vec3 origin = world_or_local.origin, direction = world_or_local.direction;
     BvhRay ray;
     const uint main = bvh_main_axis(direction), x = bvh_x_axis(main), y = bvh_y_axis(main);
     bvh_point(&ray, bvh_octant(direction), main);
-    ray.slab[0] = bvh_slab(origin.x, direction.x);
-    ray.slab[1] = bvh_slab(origin.y, direction.y);
-    ray.slab[2] = bvh_slab(origin.z, direction.z);
-    ray.shear[2] = 1.0f / bvh_component(direction, main);
-    ray.shear[0] = bvh_component(direction, x) * ray.shear[2];
-    ray.shear[1] = bvh_component(direction, y) * ray.shear[2];
-    ray.origin[0] = bvh_component(origin, x);
-    ray.origin[1] = bvh_component(origin, y);
-    ray.origin[2] = bvh_component(origin, main);
+    ray.slab[0] = slab_of(origin.x, direction.x);
+    ray.slab[1] = slab_of(origin.y, direction.y);
+    ray.slab[2] = slab_of(origin.z, direction.z);
+    ray.shear[2] = 1.0f / component(direction, main);
+    ray.shear[0] = component(direction, x) * ray.shear[2];
+    ray.shear[1] = component(direction, y) * ray.shear[2];
+    ray.origin[0] = component(origin, x);
+    ray.origin[1] = component(origin, y);
+    ray.origin[2] = component(origin, main);
     return ray;
 }
 
@@ -267,7 +248,7 @@ INLINE uint bvh_push(__global const Node *node, uint lanes, const float8 entry, 
 }
 
 // Takes the nearest of the hits in `lanes` of a pack, if it is nearer than the one before.
-INLINE bool bvh_keep(uint pack, uint lanes, const float8 distance, const float8 *weight, BvhHit *hit) {
+INLINE bool bvh_keep(uint pack, uint lanes, const float8 distance, const float8 *weight, RawHit *hit) {
     const float *distances = (const float *)&distance;
     uint nearest = BVH_FIRST_BIT(lanes);
     for (lanes &= lanes - 1; lanes; lanes &= lanes - 1) {
@@ -277,7 +258,7 @@ INLINE bool bvh_keep(uint pack, uint lanes, const float8 distance, const float8 
     if (!(distances[nearest] < hit->distance))
         return false;
     hit->distance = distances[nearest];
-    hit->triangle = pack * BVH_WIDTH + nearest;
+    hit->triangle = IN_FIELD(pack, PLACE_PACK) + nearest;
 #pragma unroll
     for (uint i = 0; i < 3; i++)
         hit->weight[i] = ((const float *)&weight[i])[nearest];
@@ -297,7 +278,7 @@ INLINE void bvh_prefetch(__global const Node *nodes, __global const TrianglePack
 
 // Nearest triangle of a mesh before hit->distance; any one of them if `any`, which fills nothing in.
 INLINE bool bvh_trace_mesh(const BvhRay *ray, __global const Node *nodes, __global const TrianglePack *packs,
-                           const bool any, BvhHit *hit) {
+                           const bool any, RawHit *hit) {
     ulong stack[BVH_STACK_SIZE];
     uint height = 0, reference = 0;
     bool found = false;
@@ -305,6 +286,7 @@ INLINE bool bvh_trace_mesh(const BvhRay *ray, __global const Node *nodes, __glob
         float8 distance;
         if (!(reference & NODE_LEAF)) {
             __global const Node *node = nodes + reference;
+            COUNT_VISIT(hit, visited_nodes);
             const uint lanes = bvh_boxes(ray, node, hit->distance, &distance);
             if (lanes) {
                 reference = bvh_push(node, lanes, distance, stack, &height);
@@ -316,6 +298,7 @@ INLINE bool bvh_trace_mesh(const BvhRay *ray, __global const Node *nodes, __glob
         } else {
             float8 weight[3];
             const uint pack = reference & ~NODE_LEAF;
+            COUNT_VISIT(hit, visited_packs);
             const uint lanes = bvh_triangles(ray, packs + pack, hit->distance, &distance, weight);
             if (lanes) {
                 if (any)
@@ -344,24 +327,32 @@ INLINE Vec3 bvh_object_vector(__global const Object *object, Vec3 v) {
                 m[8] * v.x + m[9] * v.y + m[10] * v.z);
 }
 
-INLINE bool bvh_trace_object(const Geometry *geometry, __global const Object *object, Vec3 origin,
-                             Vec3 direction, const bool any, BvhHit *hit) {
-    const BvhRay ray = bvh_ray(bvh_object_point(object, origin), bvh_object_vector(object, direction));
-    return bvh_trace_mesh(&ray, geometry->nodes + object->first_node, geometry->packs + object->first_pack,
-                          any, hit);
+INLINE Ray bvh_object_ray(__global const Object *object, Ray ray) {
+    Ray object_ray;
+    object_ray.origin = bvh_object_point(object, ray.origin);
+    object_ray.direction = bvh_object_vector(object, ray.direction);
+    return object_ray;
+}
+
+INLINE bool bvh_trace_object(const Geometry *geometry, __global const Object *object, Ray ray, const bool any,
+                             RawHit *hit) {
+    const BvhRay object_ray = bvh_ray(bvh_object_ray(object, ray));
+    return bvh_trace_mesh(&object_ray, geometry->nodes + object->first_node,
+                          geometry->packs + object->first_pack, any, hit);
 }
 
 // Nearest hit of the scene with 0 < t < hit->distance, else object is NO_INDEX; any one of them if `any`,
 // which fills nothing in.
-INLINE bool bvh_trace(const Geometry *geometry, Vec3 origin, Vec3 direction, const bool any, BvhHit *hit) {
+INLINE bool bvh_trace(const Geometry *geometry, Ray world_ray, const bool any, RawHit *hit) {
     __global const Node *top_nodes = geometry->top_nodes;
-    const BvhRay ray = bvh_ray(origin, direction);
+    const BvhRay ray = bvh_ray(world_ray);
     ulong stack[BVH_TOP_STACK_SIZE];
     uint height = 0, reference = 0;
     hit->object = NO_INDEX;
     for (;;) {
         if (!(reference & NODE_LEAF)) {
             float8 entry;
+            COUNT_VISIT(hit, visited_nodes);
             const uint lanes = bvh_boxes(&ray, top_nodes + reference, hit->distance, &entry);
             if (lanes) {
                 reference = bvh_push(top_nodes + reference, lanes, entry, stack, &height);
@@ -370,23 +361,24 @@ INLINE bool bvh_trace(const Geometry *geometry, Vec3 origin, Vec3 direction, con
         } else if (reference & NODE_PACK) {
             float8 distance, weight[3];
             const uint pack = reference & ~(NODE_LEAF | NODE_PACK);
+            COUNT_VISIT(hit, visited_packs);
             const uint lanes =
                 bvh_triangles(&ray, geometry->top_packs + pack, hit->distance, &distance, weight);
             if (lanes) {
                 if (any)
                     return true;
                 if (bvh_keep(pack, lanes, distance, weight, hit)) {
-                    hit->object = geometry->top_packs[pack].object[hit->triangle % BVH_WIDTH];
+                    hit->object = geometry->top_packs[pack].object[FIELD(hit->triangle, PLACE_LANE)];
                     hit->triangle |= NODE_PACK;
                 }
             }
         } else {
             __global const Object *object = geometry->objects + (reference & ~NODE_LEAF);
-            if (object->visible && bvh_trace_object(geometry, object, origin, direction, any, hit)) {
+            if (object->visible && bvh_trace_object(geometry, object, world_ray, any, hit)) {
                 if (any)
                     return true;
                 hit->object = reference & ~NODE_LEAF;
-                hit->triangle += object->first_pack * BVH_WIDTH;
+                hit->triangle += IN_FIELD(object->first_pack, PLACE_PACK);
             }
         }
         const ulong limit = bvh_entry(NODE_EMPTY, hit->distance);
@@ -396,4 +388,17 @@ INLINE bool bvh_trace(const Geometry *geometry, Vec3 origin, Vec3 direction, con
         } while (stack[--height] > limit);
         reference = (uint)stack[height];
     }
+}
+
+// The nearest hit along a ray before `limit`. False, and object NO_INDEX, where the ray meets nothing.
+INLINE bool bvh_nearest(const Geometry *geometry, Ray ray, float limit, RawHit *hit) {
+    hit->distance = limit;
+    return bvh_trace(geometry, ray, false, hit);
+}
+
+// Whether a ray meets anything before `limit`.
+INLINE bool bvh_any(const Geometry *geometry, Ray ray, float limit) {
+    RawHit hit;
+    hit.distance = limit;
+    return bvh_trace(geometry, ray, true, &hit);
 }

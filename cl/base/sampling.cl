@@ -54,7 +54,7 @@ INLINE void sample_triangle(float u, float v, float *b1, float *b2) {
 }
 
 // Index of the cell of a cumulative table cdf[0 .. count] (0 first, 1 last) in which u lies. The number of
-// steps is fixed, so that all lanes take the same way.
+// steps is fixed, so that all lanes take the same steps.
 INLINE uint find_cell(__global const float *cdf, uint count, float u) {
     uint low = 0, high = count;
 #pragma unroll
@@ -71,6 +71,31 @@ INLINE uint find_cell(__global const float *cdf, uint count, float u) {
 INLINE float mis_weight(float pdf, float other_pdf) {
     float ratio = other_pdf / pdf;
     return 1.0f / (1.0f + ratio * ratio);
+}
+
+// The weight of light that was found by light sampling, with a density above 0. MIS_ONLY_LIGHT and
+// MIS_ONLY_BSDF leave all light to one of the techniques, for the tests.
+INLINE float light_sampling_weight(float light_pdf, float bsdf_pdf) {
+#if defined(MIS_ONLY_LIGHT)
+    return 1.0f;
+#elif defined(MIS_ONLY_BSDF)
+    return 0.0f;
+#else
+    return mis_weight(light_pdf, bsdf_pdf);
+#endif
+}
+
+// The weight of light that a ray has found whose direction was chosen with the density `bsdf_pdf`. Where that
+// is 0 no other technique could have found the light.
+INLINE float bsdf_sampling_weight(float bsdf_pdf, float light_pdf) {
+#if defined(MIS_ONLY_LIGHT)
+    float weight = light_pdf > 0.0f ? 0.0f : 1.0f;
+#elif defined(MIS_ONLY_BSDF)
+    float weight = 1.0f;
+#else
+    float weight = mis_weight(MAX(bsdf_pdf, 1e-30f), light_pdf);
+#endif
+    return bsdf_pdf > 0.0f ? weight : 1.0f;
 }
 
 // Chance that Russian roulette lets a path go on that had `bounces` scattering events before this one.

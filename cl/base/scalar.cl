@@ -37,9 +37,17 @@
 #define CLAMP(x, low, high) MIN(MAX(x, low), high)
 #define LERP(a, b, t) ((a) + ((b) - (a)) * (t))
 
+// One of the numbers that share a word, and a number at its place in such a word; see layout.Bits.
+#define FIELD(word, name) ((word) >> name##_SHIFT & name##_MASK)
+#define IN_FIELD(number, name) ((number) << name##_SHIFT)
+
 typedef struct {
     float x, y, z;
 } Vec3;
+
+typedef struct {
+    Vec3 origin, direction; // the direction has unit length, but in the space of an object
+} Ray;
 
 INLINE Vec3 vec3(float x, float y, float z) {
     Vec3 v;
@@ -48,6 +56,9 @@ INLINE Vec3 vec3(float x, float y, float z) {
     v.z = z;
     return v;
 }
+
+// The vector that three floats in a row make up.
+INLINE Vec3 vec3_at(__global const float *v) { return vec3(v[0], v[1], v[2]); }
 
 // OpenCL has built-in functions of these names, which take its own vector types. Compilers differ in whether
 // a program may add an overload for a struct, so macros lead the calls to functions of other names. PoCL has

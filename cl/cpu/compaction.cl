@@ -1,20 +1,20 @@
 #include "cpu/lanes.cl"
 
-// Picking some of a block's paths, and moving what they carry together. For SIMD lanes paths must be
-// neighbours; gathering them plane by plane takes several times as long as the compression of AVX-512.
+// Compaction: the paths of a subset move together, plane by plane, so that the loops which follow go over
+// neighbours. AVX-512 compresses a plane several times as fast as a loop over a list of places can gather it.
 
 #if defined(__AVX512DQ__) && defined(__clang__) && !defined(PORTABLE_LANES)
 #define COMPRESS_BY_MASK
 #endif
 
-// Those of the first `of` paths of a block that are picked: a word of bits for each sixteen of them, or the
-// places of those that are.
+// Some of the first `of` paths of a block. With COMPRESS_BY_MASK there is a word for each sixteen paths, with
+// a bit for each of them; else `words` are the places of the paths in the subset.
 typedef struct {
     __local uint *words;
     uint of, count;
 } Subset;
 
-// Picks the paths whose key is `key`.
+// The paths whose key is `key`.
 INLINE Subset subset_where(__local const uint *keys, uint key, uint of, __local uint *words) {
     Subset subset = {words, of, 0};
 #ifdef COMPRESS_BY_MASK
@@ -34,9 +34,11 @@ INLINE Subset subset_where(__local const uint *keys, uint key, uint of, __local 
     return subset;
 }
 
-// What is picked of the plane `from`, one behind the other. `to` may be the same plane. The sixteen floats
-// behind the last are lost.
+// Writes the values of a subset, which stand in the plane `from`, one after the other to `to`, which may be
+// the same plane. The sixteen floats behind the last value are overwritten too.
 INLINE void compact_plane(__local float *to, __local const float *from, const Subset *subset) {
+    if (subset->count == 0)
+        return;
 #ifdef COMPRESS_BY_MASK
     for (uint first = 0; first < subset->of; first += LANE_COUNT) {
         const uint bits = subset->words[first / LANE_COUNT];
@@ -45,7 +47,7 @@ INLINE void compact_plane(__local float *to, __local const float *from, const Su
         to += (uint)__builtin_popcount(bits);
     }
 #else
-    // Places grow, so that what is read is not overwritten yet.
+    // Places grow along the list, so that no value is overwritten before it is read.
     __local const uint *words = subset->words;
     const int count = (int)subset->count;
     LANES
@@ -54,14 +56,14 @@ INLINE void compact_plane(__local float *to, __local const float *from, const Su
 #endif
 }
 
-// The places of those that are picked, counted from `base`.
+// Lists the places of the paths of a subset, counted from `base`.
 INLINE void list_subset(__local uint *list, const Subset *subset, uint base) {
 #ifdef COMPRESS_BY_MASK
     int16 place = (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15) + (int)base;
     for (uint first = 0; first < subset->of; first += LANE_COUNT) {
         const uint bits = subset->words[first / LANE_COUNT];
-        const int16 kept_places = __builtin_ia32_compresssi512_mask(place, place, (ushort)bits);
-        store_lanes((__local float *)list, as_float16(kept_places));
+        const int16 places = __builtin_ia32_compresssi512_mask(place, place, (ushort)bits);
+        store_lanes((__local float *)list, as_float16(places));
         list += (uint)__builtin_popcount(bits);
         place += (int)LANE_COUNT;
     }

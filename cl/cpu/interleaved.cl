@@ -1,13 +1,14 @@
-#include "accel/bvh.cl"
-#include "path/state.cl"
+#include "cpu/block.cl"
 
-// Rays on their way through the trees, several at a time in one thread, for blocks of paths.
+// Interleaved traversal: several rays on their way through the trees at a time, in one thread, for blocks of
+// paths.
 //
 // The way of one ray is a chain: the next node is known only when the boxes of this one are tested, and most
-// of the time is spent waiting for that, for memory, or for a branch that was guessed wrong to be told so. A
+// of the time is spent waiting for that, for memory, or for the outcome of a branch that was guessed wrong. A
 // few rays that take turns, a node or pack each, keep the processor busy meanwhile. For that a ray's turn
 // must end without a branch on what was just computed: it begins with one instead, on what is known since the
-// turn before. Only a pack ends with one, whether anything in it is met, which is slower without.
+// turn before. Only a turn with a pack ends with a branch, on whether anything in it is met, because it is
+// slower without.
 //
 //   turn: take the nearest child from the stack; test its boxes or triangles; push the boxes that are met
 //
@@ -15,24 +16,30 @@
 // knows for the octant of the direction (Fuetterling, Lojewski, Pfreundt, Hamann and Ebert 2017, "Accelerated
 // Single Ray Tracing for Wide Vector Units"); those that the ray does not meet are left out by compression.
 
-// Of a large mesh a few more than the processor can follow, so that memory has answered when a ray's turn
-// comes.
+// Rays under way. In the trees of large meshes they are more than the processor can follow, so that memory
+// has answered when a ray's turn comes.
 #ifdef TOP_LEVEL_ONLY
 #define INTERLEAVED_RAYS 4
 #else
 #define INTERLEAVED_RAYS 16
 #endif
-// Eight more, because all children are written and the stack grows by those that are met.
+// There is room for a whole node more, because all its children are written and the stack then grows by those
+// that are met.
 #define INTERLEAVED_STACK_SIZE (BVH_TOP_STACK_SIZE + BVH_STACK_SIZE + 1 + BVH_WIDTH)
-// On the stack below the tree of an object: the ray leaves its space there.
+// Stands on the stack below the tree of an object: the ray leaves the space of the object there.
 #define LEAVE_OBJECT NODE_EMPTY
 
-// Planes of rays that are ready to start, made in SIMD lanes.
-#define PREPARED_INVERSE 0
-#define PREPARED_NEAR_SHIFT 3
-#define PREPARED_FAR_SHIFT 6
-#define PREPARED_SHEAR 9
-#define PREPARED_HEADING 12 // octant in three bits, above them the largest component
+// Planes of rays that are prepared, in SIMD lanes, for their way through the top level.
+#define PREPARED_INVERSE 0u
+#define PREPARED_NEAR_SHIFT 3u
+#define PREPARED_FAR_SHIFT 6u
+#define PREPARED_SHEAR 9u
+#define PREPARED_HEADING 12u
+// A heading is the octant of the direction, and its largest component.
+#define HEADING_OCTANT_SHIFT 0u
+#define HEADING_OCTANT_MASK 7u
+#define HEADING_AXIS_SHIFT 3u
+#define HEADING_AXIS_MASK 3u
 
 // A ray in the space of the tree that it is in, and that tree.
 typedef struct {
@@ -40,19 +47,19 @@ typedef struct {
     __global const Node *nodes;
     __global const TrianglePack *packs;
     uint octant;         // bit i: the direction is negative along axis i
-    uint first_triangle; // of the tree, as HIT_TRIANGLE counts
+    uint first_triangle; // the place of the first triangle of the tree
 } RaySpace;
 
 typedef struct {
     RaySpace in;
-    uint object; // in whose space it is; NO_INDEX: in the world's
+    uint object; // whose space the ray is in; NO_INDEX: world space
     uint path;
     uint height;
-    BvhHit hit; // the nearest so far
+    RawHit hit; // the nearest so far
     uint reference[INTERLEAVED_STACK_SIZE];
-    float distance[INTERLEAVED_STACK_SIZE]; // of the box of that reference
+    float distance[INTERLEAVED_STACK_SIZE]; // where the ray enters the box of that reference
 #ifndef TOP_LEVEL_ONLY
-    RaySpace world; // to come back to
+    RaySpace world; // where the ray comes back to
 #endif
 } InterleavedRay;
 
@@ -62,48 +69,45 @@ INLINE void interleaved_push(InterleavedRay *ray, uint reference, float distance
     ray->height++;
 }
 
-INLINE Vec3 plane_origin(STATE const float *rays, uint path) { return load3(rays, BLOCK_STRIDE, path); }
-INLINE Vec3 plane_direction(STATE const float *rays, uint path) {
-    return load3(rays + 3 * BLOCK_STRIDE, BLOCK_STRIDE, path);
+INLINE void store_slab(__local float *prepared, uint axis, Slab slab) {
+    prepared[(PREPARED_INVERSE + axis) * BLOCK_STRIDE] = slab.inverse;
+    prepared[(PREPARED_NEAR_SHIFT + axis) * BLOCK_STRIDE] = slab.near_shift;
+    prepared[(PREPARED_FAR_SHIFT + axis) * BLOCK_STRIDE] = slab.far_shift;
 }
 
-INLINE void prepare_axis(__local float *ready, float origin, float direction) {
-    const BvhSlab slab = bvh_slab(origin, direction);
-    ready[PREPARED_INVERSE * BLOCK_STRIDE] = slab.inverse;
-    ready[PREPARED_NEAR_SHIFT * BLOCK_STRIDE] = slab.near_shift;
-    ready[PREPARED_FAR_SHIFT * BLOCK_STRIDE] = slab.far_shift;
-}
-
-INLINE void prepare_ray(__local float *ready, STATE const float *rays, uint path) {
-    const Vec3 origin = plane_origin(rays, path), direction = plane_direction(rays, path);
+INLINE void prepare_ray(__local float *prepared, __local const float *rays, uint path) {
+    const Ray ray = load_ray(rays, BLOCK_STRIDE, path);
+    const Vec3 origin = ray.origin, direction = ray.direction;
     const uint main = bvh_main_axis(direction);
-    const float inverse = 1.0f / bvh_component(direction, main);
-    prepare_axis(ready + path, origin.x, direction.x);
-    prepare_axis(ready + BLOCK_STRIDE + path, origin.y, direction.y);
-    prepare_axis(ready + 2 * BLOCK_STRIDE + path, origin.z, direction.z);
-    store3(ready + PREPARED_SHEAR * BLOCK_STRIDE, BLOCK_STRIDE, path,
-           vec3(bvh_component(direction, bvh_x_axis(main)) * inverse,
-                bvh_component(direction, bvh_y_axis(main)) * inverse, inverse));
-    store_bits(ready, PREPARED_HEADING * BLOCK_STRIDE + path, bvh_octant(direction) | main << 3);
+    const float inverse = 1.0f / component(direction, main);
+    store_slab(prepared + path, 0, slab_of(origin.x, direction.x));
+    store_slab(prepared + path, 1, slab_of(origin.y, direction.y));
+    store_slab(prepared + path, 2, slab_of(origin.z, direction.z));
+    store3(prepared + PREPARED_SHEAR * BLOCK_STRIDE, BLOCK_STRIDE, path,
+           vec3(component(direction, bvh_x_axis(main)) * inverse,
+                component(direction, bvh_y_axis(main)) * inverse, inverse));
+    store_bits(prepared, PREPARED_HEADING * BLOCK_STRIDE + path,
+               IN_FIELD(bvh_octant(direction), HEADING_OCTANT) | IN_FIELD(main, HEADING_AXIS));
 }
 
-INLINE void interleaved_start(InterleavedRay *ray, const Geometry *geometry, __local const float *ready,
-                              STATE const float *rays, uint path, float limit) {
-    const uint heading = as_uint(ready[PREPARED_HEADING * BLOCK_STRIDE + path]);
-    const uint main = heading >> 3;
+// Sends the ray of a path on its way, to look as far as `limit`.
+INLINE void interleaved_start(InterleavedRay *ray, const Geometry *geometry, __local const float *planes,
+                              __local const float *rays, uint path, float limit) {
+    const uint heading = load_bits(planes, PREPARED_HEADING * BLOCK_STRIDE + path);
+    const uint octant = FIELD(heading, HEADING_OCTANT), main = FIELD(heading, HEADING_AXIS);
     BvhRay *prepared = &ray->in.prepared;
-    bvh_point(prepared, heading & 7u, main);
+    bvh_point(prepared, octant, main);
 #pragma unroll
     for (uint i = 0; i < 3; i++) {
-        prepared->slab[i].inverse = ready[(PREPARED_INVERSE + i) * BLOCK_STRIDE + path];
-        prepared->slab[i].near_shift = ready[(PREPARED_NEAR_SHIFT + i) * BLOCK_STRIDE + path];
-        prepared->slab[i].far_shift = ready[(PREPARED_FAR_SHIFT + i) * BLOCK_STRIDE + path];
-        prepared->shear[i] = ready[(PREPARED_SHEAR + i) * BLOCK_STRIDE + path];
+        prepared->slab[i].inverse = planes[(PREPARED_INVERSE + i) * BLOCK_STRIDE + path];
+        prepared->slab[i].near_shift = planes[(PREPARED_NEAR_SHIFT + i) * BLOCK_STRIDE + path];
+        prepared->slab[i].far_shift = planes[(PREPARED_FAR_SHIFT + i) * BLOCK_STRIDE + path];
+        prepared->shear[i] = planes[(PREPARED_SHEAR + i) * BLOCK_STRIDE + path];
     }
-    prepared->origin[0] = rays[bvh_x_axis(main) * BLOCK_STRIDE + path];
-    prepared->origin[1] = rays[bvh_y_axis(main) * BLOCK_STRIDE + path];
-    prepared->origin[2] = rays[main * BLOCK_STRIDE + path];
-    ray->in.octant = heading & 7u;
+    prepared->origin[0] = rays[(RAY_ORIGIN_X + bvh_x_axis(main)) * BLOCK_STRIDE + path];
+    prepared->origin[1] = rays[(RAY_ORIGIN_X + bvh_y_axis(main)) * BLOCK_STRIDE + path];
+    prepared->origin[2] = rays[(RAY_ORIGIN_X + main) * BLOCK_STRIDE + path];
+    ray->in.octant = octant;
     ray->in.nodes = geometry->top_nodes;
     ray->in.packs = geometry->top_packs;
     ray->in.first_triangle = NODE_PACK;
@@ -116,26 +120,26 @@ INLINE void interleaved_start(InterleavedRay *ray, const Geometry *geometry, __l
 }
 
 #ifndef TOP_LEVEL_ONLY
-INLINE void interleaved_enter_object(InterleavedRay *ray, const Geometry *geometry, STATE const float *rays,
+INLINE void interleaved_enter_object(InterleavedRay *ray, const Geometry *geometry, __local const float *rays,
                                      uint index) {
     __global const Object *object = geometry->objects + index;
     if (!object->visible)
         return;
     ray->world = ray->in;
-    const Vec3 direction = bvh_object_vector(object, plane_direction(rays, ray->path));
-    ray->in.prepared = bvh_ray(bvh_object_point(object, plane_origin(rays, ray->path)), direction);
-    ray->in.octant = bvh_octant(direction);
+    const Ray object_ray = bvh_object_ray(object, load_ray(rays, BLOCK_STRIDE, ray->path));
+    ray->in.prepared = bvh_ray(object_ray);
+    ray->in.octant = bvh_octant(object_ray.direction);
     ray->in.nodes = geometry->nodes + object->first_node;
     ray->in.packs = geometry->packs + object->first_pack;
-    ray->in.first_triangle = object->first_pack * BVH_WIDTH;
+    ray->in.first_triangle = IN_FIELD(object->first_pack, PLACE_PACK);
     ray->object = index;
     interleaved_push(ray, LEAVE_OBJECT, 0.0f);
     interleaved_push(ray, 0, 0.0f);
 }
 #endif
 
-// Pushes the children of a node that are met (`near` <= `far`), in its order for the octant. With `any` their
-// distances are not needed: see interleaved_turn.
+// Pushes the children of a node that are met (`near` <= `far`), in the order that the node has for the
+// octant. With `any` their distances are not needed: see interleaved_turn.
 INLINE void interleaved_push_children(InterleavedRay *ray, __global const Node *node, const float8 near,
                                       const float8 far, const bool any) {
     const uint order = node->order[ray->in.octant];
@@ -175,7 +179,7 @@ INLINE void interleaved_test_node(InterleavedRay *ray, uint reference, const boo
     interleaved_push_children(ray, node, near, far, any);
 }
 
-// Whether the ray has met a triangle of a pack; it keeps the nearest, unless `any` will do.
+// Whether the ray has met a triangle of a pack. It keeps the nearest one, unless `any` will do.
 INLINE bool interleaved_test_pack(InterleavedRay *ray, uint pack, const bool any) {
     float8 distance, weight[3];
     const uint lanes =
@@ -183,14 +187,16 @@ INLINE bool interleaved_test_pack(InterleavedRay *ray, uint pack, const bool any
     if (!lanes)
         return false;
     if (!any && bvh_keep(pack, lanes, distance, weight, &ray->hit)) {
-        ray->hit.object =
-            ray->object != NO_INDEX ? ray->object : ray->in.packs[pack].object[ray->hit.triangle % BVH_WIDTH];
+        ray->hit.object = ray->object != NO_INDEX
+                              ? ray->object
+                              : ray->in.packs[pack].object[FIELD(ray->hit.triangle, PLACE_LANE)];
         ray->hit.triangle += ray->in.first_triangle;
     }
     return true;
 }
 
-// What comes next lies in memory that is slow to answer, if the mesh is large; it is asked for a round early.
+// Asks for the node or pack of the ray's next turn a round early: that of a large mesh lies in memory that is
+// slow to answer.
 INLINE void interleaved_prefetch(const InterleavedRay *ray) {
 #ifndef TOP_LEVEL_ONLY
     if (ray->object != NO_INDEX)
@@ -198,9 +204,10 @@ INLINE void interleaved_prefetch(const InterleavedRay *ray) {
 #endif
 }
 
-// One node or pack more. With `any` the limit stays what it was when a box was met, so that it is not
-// compared again. False when the ray is done: there is nothing left, or, with `any`, something is met.
-INLINE bool interleaved_turn(InterleavedRay *ray, const Geometry *geometry, STATE const float *rays,
+// One node or pack more. With `any` the limit stays what it was when a box was met, so that the distance of
+// the box is not compared again. False when the ray is done: nothing is left on the stack, or, with `any`,
+// something is met.
+INLINE bool interleaved_turn(InterleavedRay *ray, const Geometry *geometry, __local const float *rays,
                              const bool any) {
     do {
         if (ray->height == 0)
@@ -226,89 +233,84 @@ INLINE bool interleaved_turn(InterleavedRay *ray, const Geometry *geometry, STAT
 #endif
     const bool met = interleaved_test_pack(ray, reference & ~(NODE_LEAF | NODE_PACK), any);
     if (any && met)
-        ray->hit.object = 0; // whichever
+        ray->hit.object = 0; // any index says that something is met
     interleaved_prefetch(ray);
     return !(any && met);
 }
 
-// Leaves what a ray has met in the planes of hits, as far as `setup_surface_path` needs it. With BRUTE_FORCE
-// a hit with a triangle of the top level is there already, and stays where nothing is nearer.
-INLINE void interleaved_store_hit(const InterleavedRay *ray, const State *state) {
-    STATE float *hits = state->hits + ray->path;
-    const BvhHit *hit = &ray->hit;
+// Ends the way of a ray: stores its hit, or, with `any`, adds the radiance of a shadow ray that nothing is in
+// the way of. With BRUTE_FORCE there is a raw hit already, which stays where the trees have nothing nearer.
+INLINE void interleaved_end(const InterleavedRay *ray, const Block *block, const bool any) {
+    const int met = ray->hit.object != NO_INDEX;
+    if (any) {
+        if (!met)
+            accumulate(&block->state, load_result(&block->state, ray->path),
+                       load_light_sample(&block->state, ray->path).radiance);
+        return;
+    }
 #ifdef BRUTE_FORCE
-    if (hit->object == NO_INDEX)
+    if (!met)
         return;
 #endif
-    hits[HIT_DISTANCE * BLOCK_STRIDE] = hit->distance;
-    hits[HIT_OBJECT * BLOCK_STRIDE] = as_float(hit->object);
-    hits[HIT_TRIANGLE * BLOCK_STRIDE] = as_float(hit->triangle);
-#pragma unroll
-    for (uint i = 0; i < 3; i++)
-        hits[(HIT_POSITION_X + i) * BLOCK_STRIDE] = hit->weight[i];
+    store_raw_hit(block, ray->path, &ray->hit);
 }
 
-// Adds the radiance of a shadow ray that nothing is in the way of.
-INLINE void interleaved_add_light(const InterleavedRay *ray, const State *state) {
-    if (ray->hit.object == NO_INDEX)
-        accumulate(state, load_bits(state->paths, PATH_RESULT * BLOCK_STRIDE + ray->path),
-                   load3(state->shadows + SHADOW_RADIANCE_R * BLOCK_STRIDE, BLOCK_STRIDE, ray->path));
+INLINE float interleaved_limit(const Block *block, uint path, const bool any) {
+    return any ? block->state.shadows[SHADOW_DISTANCE * BLOCK_STRIDE + path] : nearest_limit(block, path);
 }
 
-INLINE float interleaved_limit(const State *state, uint path, const bool any) {
-    if (any)
-        return state->shadows[SHADOW_DISTANCE * BLOCK_STRIDE + path];
-#ifdef BRUTE_FORCE
-    return state->hits[HIT_DISTANCE * BLOCK_STRIDE + path];
-#else
-    return INFINITY;
-#endif
-}
-
-// The rays of the `count` paths in `list`: their nearest hits, or, with `any`, what their shadow rays bring.
-INLINE void interleaved_trace(const Geometry *geometry, const State *state, __local const float *ready,
-                              __local const uint *list, uint count, const bool any) {
-    STATE const float *rays = any ? state->shadows : state->rays;
+// The rays of the first `count` paths in the list: their nearest hits, or, with `any`, what their shadow rays
+// bring. `prepared` are planes of all rays that are in `rays`.
+INLINE void interleaved_trace(const Block *block, __local const float *rays, __local const float *prepared,
+                              uint count, const bool any) {
+    const Geometry *geometry = &block->geometry;
+    __local const uint *list = UINT_PLANES(block->memory, LIST);
     InterleavedRay all[INTERLEAVED_RAYS];
-    InterleavedRay *order[INTERLEAVED_RAYS]; // those under way in front
+    InterleavedRay *order[INTERLEAVED_RAYS]; // those under way stand in front
     uint started = 0, under_way = 0;
     for (; under_way < INTERLEAVED_RAYS && started < count; under_way++, started++) {
         order[under_way] = all + under_way;
-        interleaved_start(all + under_way, geometry, ready, rays, list[started],
-                          interleaved_limit(state, list[started], any));
+        interleaved_start(all + under_way, geometry, prepared, rays, list[started],
+                          interleaved_limit(block, list[started], any));
     }
     while (under_way > 0) {
         for (uint i = 0; i < under_way; i++) {
             InterleavedRay *ray = order[i];
             if (interleaved_turn(ray, geometry, rays, any))
                 continue;
-            if (any)
-                interleaved_add_light(ray, state);
-            else
-                interleaved_store_hit(ray, state);
+            interleaved_end(ray, block, any);
             if (started == count) {
                 order[i] = order[--under_way];
                 continue;
             }
-            interleaved_start(ray, geometry, ready, rays, list[started],
-                              interleaved_limit(state, list[started], any));
+            interleaved_start(ray, geometry, prepared, rays, list[started],
+                              interleaved_limit(block, list[started], any));
             started++;
         }
     }
 }
 
-// PoCL keeps the variables of a kernel for each work-item of a group apart; those of a function that is
-// called lie in one place, and stay in the nearest cache.
-static __attribute__((noinline)) void interleaved_nearest(const Geometry *geometry, const State *state,
-                                                          __local const float *ready,
-                                                          __local const uint *list, uint count) {
-    interleaved_trace(geometry, state, ready, list, count, false);
+#ifndef BRUTE_FORCE_ONLY
+STAGE void prepare_rays(__local float *prepared, __local const float *rays, uint count) {
+    LANES
+    for (int i = 0; i < (int)count; i++)
+        prepare_ray(prepared, rays, i);
+}
+
+// The nearest hits of the first `listed` paths in the list, which are some of `count` traced paths.
+STAGE void interleaved_nearest(const Block *block, uint count, uint listed) {
+    __local float *prepared = PLANES(block->memory, PREPARED);
+    if (listed > 0)
+        prepare_rays(prepared, block->traced.rays, count);
+    interleaved_trace(block, block->traced.rays, prepared, listed, false);
 }
 
 #ifdef LIGHT_SAMPLING
-static __attribute__((noinline)) void interleaved_any(const Geometry *geometry, const State *state,
-                                                      __local const float *ready, __local const uint *list,
-                                                      uint count) {
-    interleaved_trace(geometry, state, ready, list, count, true);
+// The same of shadow rays, of `count` paths: adds the radiance of those that nothing is in the way of.
+STAGE void interleaved_any(const Block *block, uint count, uint listed) {
+    __local float *prepared = PLANES(block->memory, PREPARED_SHADOWS);
+    prepare_rays(prepared, block->state.shadows, count);
+    interleaved_trace(block, block->state.shadows, prepared, listed, true);
 }
+#endif
 #endif

@@ -1,20 +1,20 @@
 #include "cpu/interleaved.cl"
 #include "cpu/lane_triangle.cl"
 
-// Camera rays through the trees, sixteen at a time with one stack, for blocks of paths.
+// Packet traversal: camera rays through the trees, sixteen at a time with one stack, for blocks of paths.
 //
 // Neighbouring paths start through the same pixel or through pixels next to each other, so that their rays
 // meet the same nodes: a packet reads a node once, and tests each of its boxes against all rays in the lanes.
-// Of a pack that many rays look at, triangles are tested one by one in the lanes; where they are few, each
-// ray is tested against its eight triangles as in flights. Rays that have been scattered, and those to points
-// of lamps, part too soon.
+// Where many of the rays enter the box of a pack, its triangles are tested one by one against all rays in the
+// lanes; where few do, each of those rays is tested against the eight triangles in the lanes. Rays that have
+// been scattered, and those to points of lamps, go different ways too soon.
 
 #if defined(__AVX512DQ__) && defined(__clang__) && !defined(PORTABLE_LANES)
 #define PACKETS
 #endif
 
 #if defined(PACKETS) && !defined(BRUTE_FORCE_ONLY)
-// A pack is tested in the lanes from so many rays on.
+// From so many rays on the triangles of a pack are tested one by one.
 #define PACKET_MANY 11u
 
 #define PACKET_ABS(v) as_float16(as_int16(v) & INT_MAX)
@@ -22,7 +22,7 @@
 // The rays in the space of the tree that they are in; see BvhRay. Their directions have the same signs and
 // the same largest component.
 typedef struct {
-    float16 inverse[3], near_shift[3], far_shift[3];
+    Slab16 slab[3];
     float16 origin[3], shear[3]; // along the axes of the triangle test
     uint octant, main;
 } PacketRays;
@@ -30,12 +30,12 @@ typedef struct {
 typedef struct {
     __global const Node *nodes;
     __global const TrianglePack *packs;
-    uint object;         // in whose space they are; NO_INDEX: in the world's
-    uint first_triangle; // of the tree, as HIT_TRIANGLE counts
+    uint object;         // whose space the rays are in; NO_INDEX: world space
+    uint first_triangle; // the place of the first triangle of the tree
 } PacketPlace;
 
 typedef struct {
-    PacketRays rays, world;   // where they are, and to come back to
+    PacketRays rays, world;   // in the space where they are, and in world space
     float16 limit, weight[3]; // of the nearest hits so far
     uint16 triangle, object;
     uint height;
@@ -65,17 +65,8 @@ INLINE bool packet_prepare(PacketRays *rays, const float16 *origin, const float1
     rays->octant = (uint)heading.s0 & 7u;
     rays->main = (uint)heading.s0 >> 3;
 #pragma unroll
-    for (uint i = 0; i < 3; i++) { // as bvh_slab
-        const int16 zero = PACKET_ABS(direction[i]) < BVH_ZERO;
-        const float16 least =
-            as_float16((as_int16(direction[i]) & INT_MIN) | as_int16((float16)(1.0f / BVH_INVERSE_ZERO)));
-        rays->inverse[i] = 1.0f / (zero ? least : direction[i]);
-        const float16 shift = -origin[i] * rays->inverse[i];
-        const float16 between = zero ? (float16)(BVH_INVERSE_ZERO * 1e-10f) : (float16)(0.0f);
-        const float16 slack = PACKET_ABS(shift) * BVH_SLACK + between;
-        rays->near_shift[i] = shift - slack;
-        rays->far_shift[i] = shift + slack;
-    }
+    for (uint i = 0; i < 3; i++)
+        rays->slab[i] = slab_of_lanes(origin[i], direction[i]);
     const uint axes[3] = {bvh_x_axis(rays->main), bvh_y_axis(rays->main), rays->main};
     rays->shear[2] = 1.0f / direction[axes[2]];
     rays->shear[0] = direction[axes[0]] * rays->shear[2];
@@ -96,12 +87,12 @@ INLINE void packet_test_node(Packet *packet, const PacketPlace *place, uint refe
         const uint lane = order >> (3 * i) & 7u, child = node->child[lane];
         if (child == NODE_EMPTY)
             continue;
-        const float16 near_x = node->bounds[x][lane] * rays->inverse[0] + rays->near_shift[0];
-        const float16 near_y = node->bounds[y][lane] * rays->inverse[1] + rays->near_shift[1];
-        const float16 near_z = node->bounds[z][lane] * rays->inverse[2] + rays->near_shift[2];
-        const float16 far_x = node->bounds[x ^ 1u][lane] * rays->inverse[0] + rays->far_shift[0];
-        const float16 far_y = node->bounds[y ^ 1u][lane] * rays->inverse[1] + rays->far_shift[1];
-        const float16 far_z = node->bounds[z ^ 1u][lane] * rays->inverse[2] + rays->far_shift[2];
+        const float16 near_x = node->bounds[x][lane] * rays->slab[0].inverse + rays->slab[0].near_shift;
+        const float16 near_y = node->bounds[y][lane] * rays->slab[1].inverse + rays->slab[1].near_shift;
+        const float16 near_z = node->bounds[z][lane] * rays->slab[2].inverse + rays->slab[2].near_shift;
+        const float16 far_x = node->bounds[x ^ 1u][lane] * rays->slab[0].inverse + rays->slab[0].far_shift;
+        const float16 far_y = node->bounds[y ^ 1u][lane] * rays->slab[1].inverse + rays->slab[1].far_shift;
+        const float16 far_z = node->bounds[z ^ 1u][lane] * rays->slab[2].inverse + rays->slab[2].far_shift;
         const float16 near_xy = BVH_MAX8(near_x, near_y), near_z0 = BVH_MAX8(near_z, (float16)(0.0f));
         const float16 far_xy = BVH_MIN8(far_x, far_y), far_z1 = BVH_MIN8(far_z, packet->limit);
         const float16 near = BVH_MAX8(near_xy, near_z0);
@@ -133,7 +124,7 @@ INLINE void packet_test_pack_by_ray(Packet *packet, const PacketPlace *place, ui
             ray.shear[i] = ((const float *)&rays->shear[i])[lane];
         }
         float8 distance, weight[3];
-        BvhHit hit;
+        RawHit hit;
         hit.distance = ((const float *)&packet->limit)[lane];
         const uint met = bvh_triangles(&ray, pack, hit.distance, &distance, weight);
         if (!met || !bvh_keep(index, met, distance, weight, &hit))
@@ -141,7 +132,7 @@ INLINE void packet_test_pack_by_ray(Packet *packet, const PacketPlace *place, ui
         ((float *)&packet->limit)[lane] = hit.distance;
         ((uint *)&packet->triangle)[lane] = hit.triangle + place->first_triangle;
         ((uint *)&packet->object)[lane] =
-            place->object != NO_INDEX ? place->object : pack->object[hit.triangle % BVH_WIDTH];
+            place->object != NO_INDEX ? place->object : pack->object[FIELD(hit.triangle, PLACE_LANE)];
 #pragma unroll
         for (uint i = 0; i < 3; i++)
             ((float *)&packet->weight[i])[lane] = hit.weight[i];
@@ -170,7 +161,7 @@ INLINE void packet_test_pack(Packet *packet, const PacketPlace *place, uint inde
         const int16 met = inside & (distance > 0.0f) & (distance < packet->limit);
         lane_keep(met, distance, weight, &packet->limit, packet->weight);
         packet->triangle =
-            met ? (uint16)(index * BVH_WIDTH + lane + place->first_triangle) : packet->triangle;
+            met ? (uint16)(IN_FIELD(index, PLACE_PACK) + lane + place->first_triangle) : packet->triangle;
         packet->object =
             met ? (uint16)(place->object != NO_INDEX ? place->object : pack->object[lane]) : packet->object;
     }
@@ -198,7 +189,7 @@ INLINE bool packet_enter_object(Packet *packet, PacketPlace *place, const Geomet
     place->object = index;
     place->nodes = geometry->nodes + object->first_node;
     place->packs = geometry->packs + object->first_pack;
-    place->first_triangle = object->first_pack * BVH_WIDTH;
+    place->first_triangle = IN_FIELD(object->first_pack, PLACE_PACK);
     packet_push(packet, LEAVE_OBJECT);
     packet_push(packet, 0);
     return packet_prepare(&packet->rays, p, d);
@@ -207,7 +198,7 @@ INLINE bool packet_enter_object(Packet *packet, PacketPlace *place, const Geomet
 
 // The nearest hits of the sixteen rays in these planes, before `limit`. False where the rays do not keep
 // together; then nothing is found.
-INLINE bool packet_trace(Packet *packet, const Geometry *geometry, STATE const float *planes) {
+INLINE bool packet_trace(Packet *packet, const Geometry *geometry, __local const float *planes) {
     float16 origin[3], direction[3];
 #pragma unroll
     for (uint i = 0; i < 3; i++) {
@@ -253,40 +244,41 @@ INLINE bool packet_trace(Packet *packet, const Geometry *geometry, STATE const f
     return true;
 }
 
-INLINE void packet_store_plane(STATE float *plane, int16 met, float16 value) {
+INLINE void packet_store_plane(__local float *plane, int16 met, float16 value) {
     store_lanes(plane, met ? value : load_lanes(plane));
 }
 
-// As interleaved_store_hit.
-INLINE void packet_store_hit(const Packet *packet, const State *state, uint path) {
-    STATE float *hits = state->hits + path;
+// Stores the hits of sixteen paths from place `path` on. With BRUTE_FORCE there are raw hits already, which
+// stay where the trees have nothing nearer.
+INLINE void packet_store_hits(const Packet *packet, const Block *block, uint path) {
+    __local float *hits = PLANES(block->memory, RAW_HITS) + path;
 #ifdef BRUTE_FORCE
     const int16 met = packet->object != NO_INDEX;
 #else
     const int16 met = -1;
 #endif
-    packet_store_plane(hits + HIT_DISTANCE * BLOCK_STRIDE, met, packet->limit);
-    packet_store_plane(hits + HIT_OBJECT * BLOCK_STRIDE, met, as_float16(packet->object));
-    packet_store_plane(hits + HIT_TRIANGLE * BLOCK_STRIDE, met, as_float16(packet->triangle));
+    packet_store_plane(hits + RAW_HIT_DISTANCE * BLOCK_STRIDE, met, packet->limit);
+    packet_store_plane(hits + RAW_HIT_OBJECT * BLOCK_STRIDE, met, as_float16(packet->object));
+    packet_store_plane(hits + RAW_HIT_TRIANGLE * BLOCK_STRIDE, met, as_float16(packet->triangle));
 #pragma unroll
     for (uint i = 0; i < 3; i++)
-        packet_store_plane(hits + (HIT_POSITION_X + i) * BLOCK_STRIDE, met, packet->weight[i]);
+        packet_store_plane(hits + (RAW_HIT_WEIGHT_A + i) * BLOCK_STRIDE, met, packet->weight[i]);
 }
 
-// The nearest hits of `count` rays as far as those of sixteen neighbours keep together. The others come to
-// stand in `list`, in order; returns how many they are.
-static __attribute__((noinline)) WIDE uint packet_nearest(const Geometry *geometry, const State *state,
-                                                          __local uint *list, uint count) {
+// The nearest hits of `count` traced paths, as far as the rays of sixteen neighbours keep together. The
+// others come to stand in the list, in order; returns how many they are.
+STAGE uint packet_nearest(const Block *block, uint count) {
+    __local uint *list = UINT_PLANES(block->memory, LIST);
     Packet packet;
     uint left = 0, first = 0;
     for (; first + LANE_COUNT <= count; first += LANE_COUNT) {
 #ifdef BRUTE_FORCE
-        packet.limit = load_lanes(state->hits + HIT_DISTANCE * BLOCK_STRIDE + first);
+        packet.limit = load_lanes(PLANES(block->memory, RAW_HITS) + RAW_HIT_DISTANCE * BLOCK_STRIDE + first);
 #else
         packet.limit = INFINITY;
 #endif
-        if (packet_trace(&packet, geometry, state->rays + first)) {
-            packet_store_hit(&packet, state, first);
+        if (packet_trace(&packet, &block->geometry, block->traced.rays + first)) {
+            packet_store_hits(&packet, block, first);
             continue;
         }
         for (uint i = 0; i < LANE_COUNT; i++)

@@ -3,10 +3,12 @@
 // that its state never leaves the nearest caches, and no list goes by way of the host. Where a stage is
 // straight-line code, LLVM runs the loop in SIMD lanes.
 //
-// Before each ray the paths that live move together, behind it those that hit something, so that the loops
-// which follow go over neighbours.
+// Paths move together twice for each ray, so that loops go over neighbours: before the ray those that are
+// still alive, to the planes in which they are traced; behind it those that have hit something, back to their
+// own.
 
 #define BLOCKS
+// There is nothing but what is tested without a tree.
 #if defined(BRUTE_FORCE) && defined(TOP_LEVEL_ONLY)
 #define BRUTE_FORCE_ONLY
 #endif
@@ -17,192 +19,67 @@
 #include "path/sample_lights.cl"
 #include "path/shade_medium.cl"
 #include "cpu/packets.cl"
-#include "cpu/compaction.cl"
 #include "path/shade.cl"
+#ifdef BRUTE_FORCE
 #include "cpu/brute_force.cl"
-#include "path/trace.cl"
+#endif
 
-// Functions of their own: the compiler is quicker with several small ones, and a profiler tells them apart.
-#define STAGE static __attribute__((noinline)) WIDE
-
-// Which planes of a path outlive its ray.
+// The planes of a path up to this one outlive its ray.
 #ifdef MEDIA
 #define LAST_CARRIED PATH_MEDIUM_1
 #else
 #define LAST_CARRIED PATH_RESULT
 #endif
 
-// A work-item's block, and the scene.
-//
-// Before each ray those paths that are still alive come to stand in front, sorted by the largest component of
-// their direction where rays are swept; behind it those that have hit something do. Rays and paths lie in
-// one of two places: where shadow rays and the description of hits are kept else, while rays are traced, and
-// in planes of their own.
-typedef struct {
-    const Params *params;
-    __global const Slot *slots;
-    Geometry geometry;
-    Emitters emitters;
-    __global const float *layers;
-    BruteForce brute_force;
-    State state;
-    __local float *own_rays; // where rays and paths lie, but while rays are traced
-    __local float *own_paths;
-    __local uint *results; // the plane PATH_RESULT: where a path gathers
-    __local uint *list;    // places of paths
-    __local uint *words;   // of what is picked, as are the next three
-    __local uint *rows;
-    __local float *spare; // planes that stages use for themselves
-} Block;
-
-// There is room for rays and paths beside what is known of hits while rays are traced.
-typedef char assert_room[SHADOW_PLANES + HIT_DISTANCE >= RAY_PLANES + LAST_CARRIED + 1 ? 1 : -1];
-
-INLINE void place_paths(Block *block, __local float *rays, __local float *paths) {
-    block->state.rays = rays;
-    block->state.paths = paths;
-    block->results = (__local uint *)paths + PATH_RESULT * BLOCK_STRIDE;
-}
-
 // Starts the paths from place `first` of the path buffer on.
 STAGE void start_paths(const Block *block, uint first, uint count) {
     LANES
     for (int i = 0; i < (int)count; i++) {
         generate_path(block->params, block->slots, &block->state, i, first + i);
-        block->results[i] = i;
+        store_result(&block->state, i, i);
         store3(block->state.radiance, BLOCK_STRIDE, i, vec3(0.0f, 0.0f, 0.0f));
     }
 }
 
-#ifdef BRUTE_FORCE
-#define LIVE_KINDS 3 // by the largest component of the direction
-#else
-#define LIVE_KINDS 1
-#endif
-
-// Which of `count` paths have a bit in their class, by the kinds of their rays; in the lanes.
-STAGE void subsets_by_axis(const Block *block, __local const float *rays, uint wanted, uint count,
-                           Subset *kinds) {
-    __local uint *keys = (__local uint *)block->spare;
-    LANES
-    for (int i = 0; i < (int)count; i++) {
-        uint meant = (load_bits(block->state.paths, PATH_CLASS * BLOCK_STRIDE + i) & wanted) != 0u;
-#ifdef BRUTE_FORCE
-        uint kind = bvh_main_axis(load3(rays + 3 * BLOCK_STRIDE, BLOCK_STRIDE, i));
-#else
-        uint kind = 0u;
-#endif
-        keys[i] = meant ? kind : NO_INDEX;
-    }
-    for (uint kind = 0; kind < LIVE_KINDS; kind++)
-        kinds[kind] = subset_where(keys, kind, count, block->rows + kind * BLOCK_STRIDE);
-}
-
 // Moves the live ones of `count` paths to where they are traced, kind after kind; returns how many they are.
-STAGE uint compact_live(Block *block, uint count, Subset *kinds) {
-    State *state = &block->state;
-    subsets_by_axis(block, state->rays, CLASS_LIVE, count, kinds);
-    for (uint kind = 0; kind < LIVE_KINDS; kind++)
-        if (kinds[kind].count == count)
-            return count; // they are there already
-    __local float *rays = state->shadows, *paths = rays + RAY_PLANES * BLOCK_STRIDE;
+STAGE uint compact_live(const Block *block, uint count, Subset *kinds) {
+    const State *from = &block->state, *to = &block->traced;
+    subsets_by_kind(block, from, from->rays, CLASS_LIVE, count, kinds);
     uint live = 0;
-    for (uint kind = 0; kind < LIVE_KINDS; kind++) {
+    for (uint kind = 0; kind < RAY_KINDS; kind++) {
         for (uint p = 0; p < RAY_PLANES; p++)
-            compact_plane(rays + p * BLOCK_STRIDE + live, state->rays + p * BLOCK_STRIDE, &kinds[kind]);
+            compact_plane(to->rays + p * BLOCK_STRIDE + live, from->rays + p * BLOCK_STRIDE, &kinds[kind]);
         for (uint p = 0; p <= LAST_CARRIED; p++)
-            compact_plane(paths + p * BLOCK_STRIDE + live, state->paths + p * BLOCK_STRIDE, &kinds[kind]);
+            compact_plane(to->paths + p * BLOCK_STRIDE + live, from->paths + p * BLOCK_STRIDE, &kinds[kind]);
         live += kinds[kind].count;
     }
-    place_paths(block, rays, paths);
     return live;
 }
 
-#ifdef BRUTE_FORCE
-// Weights of the corners A, B and C of a side of a parallelepiped; `at`: local coordinates.
-INLINE Vec3 side_weights(uint turns, Vec3 at) {
-    uint along = turns >> 4;
-    float to_b = bvh_component(at, along & 3u), to_d = bvh_component(at, along >> 3 & 3u);
-    to_b = along & 4u ? 1.0f - to_b : to_b;
-    to_d = along & 32u ? 1.0f - to_d : to_d;
-    return vec3(1.0f - to_b, to_b - to_d, to_d);
-}
-
-// Of a parallelogram ABCD the sweep leaves the weights of A, B and C, where that of B is against the others
-// in the half ACD: as B is A + C - D, those of A, C and D follow.
-INLINE void store_brute_force_hit(const BruteForce *brute_force, const State *state,
-                                  __local const float *found, uint path) {
-    uint place = load_bits(found, FOUND_PLACE * BLOCK_STRIDE + path);
-    Vec3 weight = load3(found + FOUND_WEIGHT * BLOCK_STRIDE, BLOCK_STRIDE, path);
-    int met = place != NO_INDEX;
-    int side = met & ((place & FOUND_SIDE) != 0u);
-    uint index = side ? place & ((1u << FOUND_AXIS_SHIFT) - 1u) : met ? place : 0u;
-    int opposite = side & (bvh_component(weight, place >> FOUND_AXIS_SHIFT & 3u) > 0.5f);
-    index += opposite ? 1u : 0u;
-    __global const Quad *quad = brute_force->quads + index;
-    uint turns = quad->turns;
-    weight = select(side, side_weights(turns, weight), weight);
-    float others = weight.x + weight.z;
-    int second = ((weight.y < 0.0f) & (others > 0.0f)) | ((weight.y > 0.0f) & (others < 0.0f));
-    weight = select(second, vec3(weight.x + weight.y, weight.z + weight.y, -weight.y), weight);
-    uint triangle = second ? quad->place[1] : quad->place[0];
-    uint corner = (second ? turns >> 2 : turns) & 3u;
-    state->hits[HIT_DISTANCE * BLOCK_STRIDE + path] = found[FOUND_DISTANCE * BLOCK_STRIDE + path];
-    store_bits(state->hits, HIT_OBJECT * BLOCK_STRIDE + path, met ? quad->object : NO_INDEX);
-    store_bits(state->hits, HIT_TRIANGLE * BLOCK_STRIDE + path, met ? triangle : NO_INDEX);
-    Vec3 turned = select(corner == 1u, vec3(weight.z, weight.x, weight.y), weight);
-    turned = select(corner == 2u, vec3(weight.y, weight.z, weight.x), turned);
-    store3(state->hits + HIT_POSITION_X * BLOCK_STRIDE, BLOCK_STRIDE, path, turned);
-}
-
-// What the rays of `count` paths meet of the top level.
-STAGE void trace_brute_force(const Block *block, uint count, const Subset *kinds) {
-    uint first = 0;
-    for (uint axis = 0; axis < 3; axis++) {
-        brute_force_nearest(&block->brute_force, block->state.rays + first, axis, kinds[axis].count,
-                            block->spare + first);
-        first += kinds[axis].count;
-    }
-    LANES
-    for (int i = 0; i < (int)count; i++)
-        store_brute_force_hit(&block->brute_force, &block->state, block->spare, i);
-}
-#endif
-
-#ifndef BRUTE_FORCE_ONLY
-// Makes the rays in these planes ready for `interleaved_nearest` and `interleaved_any`.
-STAGE void prepare_rays(const Block *block, __local const float *rays, uint count) {
-    LANES
-    for (int i = 0; i < (int)count; i++)
-        prepare_ray(block->spare, rays, i);
-}
-#endif
-
-// Traces the rays of the live ones of `count` paths; returns how many they are. They come to stand in front.
-// `from_camera` tells whether neighbours go much the same way.
-STAGE uint trace_rays(Block *block, uint count, bool from_camera) {
-    Subset kinds[LIVE_KINDS];
+// Finds the nearest hits of the live ones of `count` paths; returns how many they are. They come to stand in
+// front. `from_camera` tells whether neighbours go much the same way.
+STAGE uint trace_rays(const Block *block, uint count, bool from_camera) {
+    Subset kinds[RAY_KINDS];
     const uint live = compact_live(block, count, kinds);
 #ifdef BRUTE_FORCE
-    trace_brute_force(block, live, kinds);
+    brute_force_nearest(block, live, kinds);
 #endif
 #ifndef BRUTE_FORCE_ONLY
+    __local uint *list = UINT_PLANES(block->memory, LIST);
     uint listed = live;
 #ifdef PACKETS
     if (from_camera)
-        listed = packet_nearest(&block->geometry, &block->state, block->list, live);
+        listed = packet_nearest(block, live);
     else
 #endif
         for (uint i = 0; i < live; i++)
-            block->list[i] = i;
-    if (listed > 0)
-        prepare_rays(block, block->state.rays, live);
-    interleaved_nearest(&block->geometry, &block->state, block->spare, block->list, listed);
+            list[i] = i;
+    interleaved_nearest(block, live, listed);
 #endif
     return live;
 }
 
-// What rays have led paths to.
+// What rays have led paths to: nothing, an opaque surface, or a boundary or the inside of a medium.
 typedef struct {
     Subset misses, surfaces, media;
 } RayEnds;
@@ -211,59 +88,60 @@ typedef struct {
 #define KEY_SURFACE 1
 #define KEY_MEDIUM 2
 
-STAGE void sort_by_ends(const Block *block, uint count, RayEnds *ends) {
-    __local uint *keys = (__local uint *)block->spare;
+STAGE void classify_hits(const Block *block, uint count, RayEnds *ends) {
+    __local uint *keys = UINT_PLANES(block->memory, KEYS), *words = UINT_PLANES(block->memory, SUBSETS);
     LANES
     for (int i = 0; i < (int)count; i++) {
-        uint hit = load_bits(block->state.hits, HIT_OBJECT * BLOCK_STRIDE + i) != NO_INDEX;
+        uint object = load_raw_hit(block, i).object;
+        uint hit = object != NO_INDEX;
 #ifdef MEDIA
-        uint medium =
-            surface_class(&block->geometry, block->emitters.materials, &block->state, i) == CLASS_MEDIUM;
+        uint medium = hit_class(&block->geometry, block->shading.materials, object,
+                                is_in_medium(&block->traced, i)) == CLASS_MEDIUM;
         keys[i] = hit ? (medium ? KEY_MEDIUM : KEY_SURFACE) : KEY_MISS;
 #else
         keys[i] = hit ? KEY_SURFACE : KEY_MISS;
 #endif
     }
-    ends->misses = subset_where(keys, KEY_MISS, count, block->rows);
-    ends->surfaces = subset_where(keys, KEY_SURFACE, count, block->rows + BLOCK_STRIDE);
+    ends->misses = subset_where(keys, KEY_MISS, count, words);
+    ends->surfaces = subset_where(keys, KEY_SURFACE, count, words + BLOCK_STRIDE);
 #ifdef MEDIA
-    ends->media = subset_where(keys, KEY_MEDIUM, count, block->rows + 2 * BLOCK_STRIDE);
+    ends->media = subset_where(keys, KEY_MEDIUM, count, words + 2 * BLOCK_STRIDE);
 #endif
 }
 
 STAGE void shade_misses(const Block *block, const Subset *misses) {
-    list_subset(block->list, misses, 0);
+    __local uint *list = UINT_PLANES(block->memory, LIST);
+    list_subset(list, misses, 0);
     LANES
     for (int i = 0; i < (int)misses->count; i++)
-        shade_miss_path(block->params, &block->emitters, &block->state, block->list[i],
-                        block->results[block->list[i]]);
+        shade_miss_path(block->params, &block->shading, &block->emitters, &block->traced, list[i],
+                        load_result(&block->traced, list[i]));
 }
 
 // Moves a plane of all paths that have hit something, those on opaque surfaces in front.
-INLINE void compact_hit_plane(__local float *to, __local const float *from, const RayEnds *ends,
-                              __local float *spare) {
+INLINE void compact_hit_plane(const Block *block, __local float *to, __local const float *from,
+                              const RayEnds *ends) {
 #ifdef MEDIA
-    compact_plane(spare, from, &ends->media);
+    __local float *moved = PLANES(block->memory, MOVED);
+    compact_plane(moved, from, &ends->media);
 #endif
     compact_plane(to, from, &ends->surfaces);
 #ifdef MEDIA
     for (uint first = 0; first < ends->media.count; first += LANE_COUNT)
-        store_lanes(to + ends->surfaces.count + first, load_lanes(spare + first));
+        store_lanes(to + ends->surfaces.count + first, load_lanes(moved + first));
 #endif
 }
 
-// Moves those paths to their own planes; returns how many they are.
-STAGE uint compact_hits(Block *block, const RayEnds *ends) {
-    const State *state = &block->state;
-    __local float *rays = block->own_rays, *paths = block->own_paths, *spare = block->spare;
+// Moves the paths that have hit something back to their own planes; returns how many they are.
+STAGE uint compact_hits(const Block *block, const RayEnds *ends) {
+    const State *from = &block->traced, *to = &block->state;
+    __local float *hits = PLANES(block->memory, RAW_HITS);
     for (uint p = RAY_DIRECTION_X; p <= RAY_DIRECTION_Z; p++)
-        compact_hit_plane(rays + p * BLOCK_STRIDE, state->rays + p * BLOCK_STRIDE, ends, spare);
+        compact_hit_plane(block, to->rays + p * BLOCK_STRIDE, from->rays + p * BLOCK_STRIDE, ends);
     for (uint p = 0; p <= LAST_CARRIED; p++)
-        compact_hit_plane(paths + p * BLOCK_STRIDE, state->paths + p * BLOCK_STRIDE, ends, spare);
-    for (uint p = HIT_DISTANCE; p <= HIT_TRIANGLE; p++)
-        if (p != HIT_MATERIAL)
-            compact_hit_plane(state->hits + p * BLOCK_STRIDE, state->hits + p * BLOCK_STRIDE, ends, spare);
-    place_paths(block, rays, paths);
+        compact_hit_plane(block, to->paths + p * BLOCK_STRIDE, from->paths + p * BLOCK_STRIDE, ends);
+    for (uint p = 0; p < RAW_HIT_PLANES; p++)
+        compact_hit_plane(block, hits + p * BLOCK_STRIDE, hits + p * BLOCK_STRIDE, ends);
 #ifdef MEDIA
     return ends->surfaces.count + ends->media.count;
 #else
@@ -271,78 +149,36 @@ STAGE uint compact_hits(Block *block, const RayEnds *ends) {
 #endif
 }
 
-#ifdef LIGHT_SAMPLING
-#ifdef BRUTE_FORCE
-// Planes of shadow rays that are swept: those of ShadowPlane up to the radiance that they bring, and where
-// that is gathered.
-#define SHADOW_RESULT SHADOW_PDF
-#define SHADOW_FOUND (SHADOW_RESULT + 1 - FOUND_PLACE)
-
-INLINE void add_unoccluded(const State *state, __local const float *rays, __local const float *found,
-                           uint i) {
-    int free = load_bits(found, FOUND_PLACE * BLOCK_STRIDE + i) == NO_INDEX;
-    Vec3 light = load3(rays + SHADOW_RADIANCE_R * BLOCK_STRIDE, BLOCK_STRIDE, i);
-    accumulate(state, load_bits(rays, SHADOW_RESULT * BLOCK_STRIDE + i),
-               select(free, light, vec3(0.0f, 0.0f, 0.0f)));
-}
-
-// Which shadow rays nothing in the top level is in the way of; returns how many. Their paths come to stand in
-// `list`, or, where there is nothing but the top level, gather what they bring.
-STAGE uint shadows_by_brute_force(const Block *block, uint count) {
-    Subset kinds[3];
-    const State *state = &block->state;
-    __local float *rays = block->spare, *found = rays + SHADOW_FOUND * BLOCK_STRIDE;
-    uint free = 0;
-    subsets_by_axis(block, state->shadows, CLASS_SHADOW, count, kinds);
-    for (uint axis = 0; axis < 3; axis++) {
-        const Subset *subset = &kinds[axis];
-        for (uint p = 0; p < SHADOW_PDF; p++)
-            compact_plane(rays + p * BLOCK_STRIDE, state->shadows + p * BLOCK_STRIDE, subset);
-        brute_force_any(&block->brute_force, rays, axis, subset->count, found);
-#ifdef BRUTE_FORCE_ONLY
-        compact_plane(rays + SHADOW_RESULT * BLOCK_STRIDE, (__local const float *)block->results, subset);
-        LANES
-        for (int i = 0; i < (int)subset->count; i++)
-            add_unoccluded(state, rays, found, i);
-#else
-        __local uint *paths = (__local uint *)rays; // which are done with
-        list_subset(paths, subset, 0);
-        const Subset unmet = subset_where((__local const uint *)found + FOUND_PLACE * BLOCK_STRIDE, NO_INDEX,
-                                          subset->count, block->words);
-        compact_plane((__local float *)block->list + free, (__local const float *)paths, &unmet);
-        free += unmet.count;
-#endif
+// A path's hit is read whole before its surface is written: the two share memory.
+STAGE void setup_surfaces(const Block *block, uint count) {
+    LANES
+    for (int i = 0; i < (int)count; i++) {
+        const RawHit hit = load_raw_hit(block, i);
+        const Surface surface = surface_at(&block->geometry, &hit);
+        store_surface(&block->state, i, &surface);
     }
-    return free;
 }
-#endif
 
+#ifdef LIGHT_SAMPLING
 // Traces the shadow rays that paths ask for, and adds what they bring.
 STAGE void trace_shadows(const Block *block, uint count) {
 #ifdef BRUTE_FORCE
-    uint listed = shadows_by_brute_force(block, count);
+    uint listed = brute_force_any(block, count);
 #else
     Subset subset;
-    subsets_by_axis(block, block->state.shadows, CLASS_SHADOW, count, &subset);
-    list_subset(block->list, &subset, 0);
+    subsets_by_kind(block, &block->state, block->state.shadows, CLASS_SHADOW, count, &subset);
+    list_subset(UINT_PLANES(block->memory, LIST), &subset, 0);
     uint listed = subset.count;
 #endif
 #ifndef BRUTE_FORCE_ONLY
-    prepare_rays(block, block->state.shadows, count);
-    interleaved_any(&block->geometry, &block->state, block->spare, block->list, listed);
+    interleaved_any(block, count, listed);
 #endif
 }
 #endif
-
-STAGE void setup_surfaces(const Block *block, uint count) {
-    LANES
-    for (int i = 0; i < (int)count; i++)
-        setup_surface_path(&block->geometry, &block->state, i);
-}
 
 #ifdef MEDIA
-// Media shade their paths from place `first` on. Those that stand on an opaque surface after all, by chance,
-// are shaded as such.
+// Shades the paths from place `first` on, which have met a medium or are inside of one. Those that turn out
+// to stand on an opaque surface are shaded as such.
 STAGE void shade_media(const Block *block, uint first, uint count) {
     const State *state = &block->state;
 #if defined(LIGHT_SAMPLING) && !defined(SMOOTH_MEDIA)
@@ -352,10 +188,11 @@ STAGE void shade_media(const Block *block, uint first, uint count) {
 #endif
     LANES
     for (int i = first; i < (int)count; i++)
-        shade_medium_path(block->params, block->emitters.materials, state, i, block->results[i]);
+        shade_medium_path(block->params, &block->shading, state, i, load_result(state, i));
     __local const uint *classes = (__local const uint *)state->paths + PATH_CLASS * BLOCK_STRIDE;
-    const Subset subset = subset_where(classes + first, CLASS_SURFACE, count - first, block->words);
-    __local uint *list = block->list;
+    const Subset subset =
+        subset_where(classes + first, CLASS_SURFACE, count - first, UINT_PLANES(block->memory, SUBSETS));
+    __local uint *list = UINT_PLANES(block->memory, LIST);
     list_subset(list, &subset, first);
     const uint opaque = subset.count;
 #ifdef LIGHT_SAMPLING
@@ -364,18 +201,17 @@ STAGE void shade_media(const Block *block, uint first, uint count) {
         sample_lights_path(block->params, &block->emitters, state, list[i]);
     LANES
     for (int i = 0; i < (int)opaque; i++)
-        absorb_light(block->emitters.materials, state, list[i]);
+        absorb_light(&block->shading, state, list[i]);
 #endif
     LANES
     for (int i = 0; i < (int)opaque; i++)
-        shade_path(block->params, block->emitters.materials, block->layers, state, list[i],
-                   block->results[list[i]]);
+        shade_path(block->params, &block->shading, state, list[i], load_result(state, list[i]));
 }
 #else
 STAGE void finish_paths(const Block *block, uint count) {
     LANES
     for (int i = 0; i < (int)count; i++)
-        finish_path(block->emitters.materials, &block->state, i, block->results[i]);
+        finish_path(&block->shading, &block->state, i, load_result(&block->state, i));
 }
 #endif
 
@@ -387,17 +223,16 @@ STAGE void shade_surfaces(const Block *block, uint count) {
 #endif
     LANES
     for (int i = 0; i < (int)count; i++)
-        shade_path(block->params, block->emitters.materials, block->layers, &block->state, i,
-                   block->results[i]);
+        shade_path(block->params, &block->shading, &block->state, i, load_result(&block->state, i));
 }
 
 // Takes the paths of a block, from place `first` of the path buffer on, from their start to their end.
-INLINE void trace_block(Block *block, uint first, uint count) {
+INLINE void trace_block(const Block *block, uint first, uint count) {
     start_paths(block, first, count);
     for (uint ray = 0; count > 0; ray++) {
         count = trace_rays(block, count, ray == 0);
         RayEnds ends;
-        sort_by_ends(block, count, &ends);
+        classify_hits(block, count, &ends);
         const float *sky = block->params->environment_color;
         if (sky[0] + sky[1] + sky[2] > 0.0f)
             shade_misses(block, &ends.misses);
@@ -419,43 +254,13 @@ INLINE void trace_block(Block *block, uint first, uint count) {
     }
 }
 
-// The parameters of a kernel over blocks, as `wavefront.block_arguments` gives them: the scene, and memory
-// for a block.
-#define BLOCK_PARAMETERS                                                                                     \
-    __global const Node *top_nodes, __global const TrianglePack *top_packs, __global const Node *nodes,      \
-        __global const TrianglePack *packs, __global const Object *objects,                                  \
-        __global const Material *materials, __global const float *normals, __global const float *layers,     \
-        __global const float *lights, __global const float *environment_image,                               \
-        __global const float *environment_marginal, __global const float *environment_conditional,           \
-        __global const float *environment_pdf, __local float *rays, __local float *paths,                    \
-        __local float *shadows_and_hits, __local float *radiance, __local uint *list, __local uint *words,   \
-        __local uint *rows, __local float *spare, __global const Quad *quads,                                \
-        __global const Parallelepiped *parallelepipeds, __global const Cluster *clusters,                    \
-        const uint cluster_count
-
-#define BLOCK(params, slots)                                                                                 \
-    {params,                                                                                                 \
-     slots,                                                                                                  \
-     {top_nodes, top_packs, nodes, packs, objects, normals},                                                 \
-     {materials, lights, environment_image, environment_marginal, environment_conditional, environment_pdf}, \
-     layers,                                                                                                 \
-     {quads, parallelepipeds, clusters, cluster_count},                                                      \
-     {rays, paths, shadows_and_hits + SHADOW_PLANES * BLOCK_STRIDE, shadows_and_hits, radiance},             \
-     rays,                                                                                                   \
-     paths,                                                                                                  \
-     (__local uint *)paths + PATH_RESULT * BLOCK_STRIDE,                                                     \
-     list,                                                                                                   \
-     words,                                                                                                  \
-     rows,                                                                                                   \
-     spare}
-
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
-trace_blocks(const Params params, __global const Slot *slots, BLOCK_PARAMETERS, __global float *path_buffer) {
-    Block block = BLOCK(&params, slots);
+trace_blocks(FRAME_PARAMETERS, SLOTS_PARAMETERS, BLOCK_PARAMETERS, RADIANCE_PARAMETERS) {
+    const Block block = BLOCK_OF(&params, slots);
     const uint first = (uint)get_group_id(0) * BLOCK_PATHS;
     const uint size = first < params.path_count ? MIN(params.path_count - first, BLOCK_PATHS) : 0;
     trace_block(&block, first, size);
     for (uint c = 0; c < 3; c++)
         for (uint i = 0; i < size; i++)
-            path_buffer[c * params.buffer_stride + first + i] = radiance[c * BLOCK_STRIDE + i];
+            path_buffer[c * params.buffer_stride + first + i] = block.state.radiance[c * BLOCK_STRIDE + i];
 }

@@ -1,25 +1,24 @@
 #include "accel/bvh.cl"
 #include "path/state.cl"
 
-// What the surface is like where a ray met it: position, normals, material, rounding bound. Straight-line
-// code of scalars, so that PoCL runs it in SIMD lanes.
+// Turns the hit that traversal has found into a surface: position, normals, material, rounding bound. This is
+// straight-line code of scalars, so that PoCL runs it in SIMD lanes.
 
-// Scenes that need less have variants that do less: TOP_LEVEL_ONLY where every triangle lies in the packs of
-// the top level, in world space, and FLAT where no mesh has normals.
+// The variants TOP_LEVEL_ONLY and FLAT leave out what a scene does not need: the way from object space, and
+// the normals of meshes.
 
 // The unit vector along v, which is scaled before it is squared, because squares of very small or large
 // components would leave the range of a float.
-INLINE Vec3 safe_unit(Vec3 v) { return normalize(scale(bvh_scale(bvh_largest(v)), v)); }
+INLINE Vec3 safe_normalize(Vec3 v) { return normalize(scale(bvh_scale(bvh_largest(v)), v)); }
 
 // A normal of object space in world space: by the inverse transpose, which keeps the outside outside, also
-// where the object is mirrored. Scaled before it is squared, because squares of very small or large
-// components would leave the range of a float.
+// where the object is mirrored.
 INLINE Vec3 world_normal(__global const Object *object, Vec3 normal) {
     __global const float *m = object->object_from_world;
     Vec3 v = vec3(m[0] * normal.x + m[4] * normal.y + m[8] * normal.z,
                   m[1] * normal.x + m[5] * normal.y + m[9] * normal.z,
                   m[2] * normal.x + m[6] * normal.y + m[10] * normal.z);
-    return safe_unit(v);
+    return safe_normalize(v);
 }
 
 INLINE Vec3 world_point(__global const Object *object, Vec3 p) {
@@ -40,8 +39,8 @@ INLINE float offset_bound(__global const Object *object, Vec3 normal) {
     return FABS(normal.x) * error[0] + FABS(normal.y) * error[1] + FABS(normal.z) * error[2];
 }
 
-// The interpolated normal on the geometric one's side; that itself where the face is flat, or where the
-// normals of its corners cancel out.
+// The interpolated normal, turned to the side of the geometric one. Where the face is flat, or where the
+// normals of its corners cancel out, it is the geometric normal itself.
 INLINE Vec3 shading_normal(__global const Object *object, __global const float *normals, uint face,
                            Vec3 weight, Vec3 geometric) {
     int smooth = object->first_normal != NO_INDEX;
@@ -55,51 +54,56 @@ INLINE Vec3 shading_normal(__global const Object *object, __global const float *
     return select(smooth, shading, geometric);
 }
 
-// How a position on a triangle moves by that much towards its centroid. A ray that starts just above one face
-// but on the plane of its neighbour, which it must not miss, would slip out where the two meet.
+// The position on a triangle, moved towards its centroid by `offset`. Without this a ray could start just
+// above one face but on the plane of the neighbouring face, and slip out where the two meet.
 INLINE Vec3 leave_edge(Vec3 centroid, float offset, Vec3 position) {
     Vec3 inwards = subtract(centroid, position);
     float share = offset / SQRT(dot(inwards, inwards));
     return along(position, share < 1.0f ? share : 0.0f, inwards);
 }
 
-// Fills in the planes of a hit of which `trace_path` has left the distance, the object, the place of the
-// triangle, and the weights of its corners, up to a common factor, in place of the position.
-INLINE void setup_surface_path(const Geometry *geometry, const State *state, uint path) {
-    uint stride = STRIDE(state);
-    __global const Object *object = geometry->objects + load_bits(state->hits, HIT_OBJECT * stride + path);
-    uint place = load_bits(state->hits, HIT_TRIANGLE * stride + path);
+// The surface of a hit. The weights of the corners may have a common factor.
+INLINE Surface surface_at(const Geometry *geometry, const RawHit *hit) {
+    __global const Object *object = geometry->objects + hit->object;
 #ifdef TOP_LEVEL_ONLY
     __global const TrianglePack *packs = geometry->top_packs;
 #else
-    int on_top = (place & NODE_PACK) != 0u;
+    int on_top = FIELD(hit->triangle, PLACE_ON_TOP) != 0u;
     __global const TrianglePack *packs = on_top ? geometry->top_packs : geometry->packs;
 #endif
-    __global const TrianglePack *pack = packs + (place & ~NODE_PACK) / BVH_WIDTH;
-    uint lane = place % BVH_WIDTH;
-    uint face = pack->face[lane];
+    __global const TrianglePack *pack = packs + FIELD(hit->triangle, PLACE_PACK);
+    uint lane = FIELD(hit->triangle, PLACE_LANE);
     Vec3 a = pack_vertex(pack, 0, lane), b = pack_vertex(pack, 1, lane), c = pack_vertex(pack, 2, lane);
-    Vec3 weight = load3(state->hits + HIT_POSITION_X * stride, stride, path);
+    Vec3 weight = vec3(hit->weight[0], hit->weight[1], hit->weight[2]);
     weight = scale(1.0f / (weight.x + weight.y + weight.z), weight);
     Vec3 position = add(scale(weight.x, a), add(scale(weight.y, b), scale(weight.z, c)));
     Vec3 centroid = scale(1.0f / 3.0f, add(a, add(b, c)));
     Vec3 normal = bvh_normal(a, b, c);
-    Vec3 geometric = scale(object->winding, safe_unit(normal));
+    Vec3 geometric = scale(object->winding, safe_normalize(normal));
 #ifndef TOP_LEVEL_ONLY
     position = select(on_top, position, world_point(object, position));
     centroid = select(on_top, centroid, world_point(object, centroid));
     geometric = select(on_top, geometric, world_normal(object, normal));
 #endif
-    float offset = offset_bound(object, geometric);
-    store3(state->hits + HIT_POSITION_X * stride, stride, path, leave_edge(centroid, offset, position));
-    store3(state->hits + HIT_GEOMETRIC_X * stride, stride, path, geometric);
+    Surface surface;
+    surface.face = pack->face[lane];
+    surface.offset = offset_bound(object, geometric);
+    surface.position = leave_edge(centroid, surface.offset, position);
+    surface.geometric = geometric;
 #ifdef FLAT
-    store3(state->hits + HIT_SHADING_X * stride, stride, path, geometric);
+    surface.shading = geometric;
 #else
-    store3(state->hits + HIT_SHADING_X * stride, stride, path,
-           shading_normal(object, geometry->normals, face, weight, geometric));
+    surface.shading = shading_normal(object, geometry->normals, surface.face, weight, geometric);
 #endif
-    state->hits[HIT_OFFSET * stride + path] = offset;
-    store_bits(state->hits, HIT_MATERIAL * stride + path, object->material);
-    store_bits(state->hits, HIT_TRIANGLE * stride + path, face);
+    surface.distance = hit->distance;
+    surface.object = hit->object;
+    surface.material = object->material;
+    return surface;
+}
+
+// Which stage shades a path that has hit this object. A path that has hit nothing is given any answer.
+INLINE uint hit_class(const Geometry *geometry, __global const Material *materials, uint object,
+                      uint in_medium) {
+    uint material = geometry->objects[object == NO_INDEX ? 0u : object].material;
+    return in_medium | (materials[material].flags & MATERIAL_TRANSMISSIVE) ? CLASS_MEDIUM : CLASS_SURFACE;
 }

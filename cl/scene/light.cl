@@ -1,8 +1,7 @@
-#include "shading/material.cl"
-#include "base/rng.cl"
+#include "base/sampling.cl"
 
 // Emitters: triangles, and the environment. Which exist is known when a kernel is built
-// (ENVIRONMENT_IMAGE, TRIANGLE_LIGHTS), so that a scene does not pay for what it has not.
+// (ENVIRONMENT_IMAGE, TRIANGLE_LIGHTS), so that a scene does not pay for emitters that it does not have.
 // A constant environment is left to BSDF sampling, which finds it without any variance of its own.
 
 #if defined(ENVIRONMENT_IMAGE) || defined(TRIANGLE_LIGHTS)
@@ -10,19 +9,10 @@
 #endif
 
 typedef struct {
-    __global const Material *materials;
-    __global const float *lights;      // planes of params.light_count triangles
-    __global const float *image;       // environment, red, green, blue, row by row from +y
-    __global const float *marginal;    // cumulative distribution of rows, height + 1
-    __global const float *conditional; // of the pixels of each row, width + 1 each
-    __global const float *texel_pdf;   // density over the unit square of the image, per texel
-} Emitters;
-
-typedef struct {
     Vec3 direction;
     float distance;
-    Vec3 radiance; // arriving, nothing in the way
-    float pdf;     // per solid angle; 0 where the sample failed
+    Vec3 radiance; // what arrives if nothing is in the way
+    float pdf;     // of the direction, per solid angle; 0 where the sample failed
 } LightSample;
 
 // Place in the lat-long image, in [0, 1) x [0, 1], of a direction. OpenEXR: the centre looks to +z, three
@@ -43,7 +33,7 @@ INLINE Vec3 environment_direction(const Params *params, Uniform2 place) {
     return vec3(-sin_polar * sine, cos_polar, sin_polar * cosine);
 }
 
-// Radiance of the image at a place, bilinear between texel centres; columns wrap round, rows end.
+// Radiance of the image at a place, bilinear between the centres of texels. Columns wrap around, rows do not.
 INLINE Vec3 image_radiance(const Params *params, const Emitters *emitters, Uniform2 place) {
     uint width = params->environment_width, height = params->environment_height;
     float x = place.u * (float)width - 0.5f;
@@ -55,10 +45,10 @@ INLINE Vec3 image_radiance(const Params *params, const Emitters *emitters, Unifo
     uint right = (uint)(x0 + 1 >= (int)width ? x0 + 1 - (int)width : x0 + 1);
     uint top = (uint)row;
     uint bottom = MIN(top + 1u, height - 1u);
-    __global const float *p00 = emitters->image + 3u * (top * width + left);
-    __global const float *p10 = emitters->image + 3u * (top * width + right);
-    __global const float *p01 = emitters->image + 3u * (bottom * width + left);
-    __global const float *p11 = emitters->image + 3u * (bottom * width + right);
+    __global const float *p00 = emitters->environment_image + 3u * (top * width + left);
+    __global const float *p10 = emitters->environment_image + 3u * (top * width + right);
+    __global const float *p01 = emitters->environment_image + 3u * (bottom * width + left);
+    __global const float *p11 = emitters->environment_image + 3u * (bottom * width + right);
     return vec3(LERP(LERP(p00[0], p10[0], tx), LERP(p01[0], p11[0], tx), ty),
                 LERP(LERP(p00[1], p10[1], tx), LERP(p01[1], p11[1], tx), ty),
                 LERP(LERP(p00[2], p10[2], tx), LERP(p01[2], p11[2], tx), ty));
@@ -104,7 +94,7 @@ INLINE LightSample sample_environment(const Params *params, const Emitters *emit
     LightSample result;
     result.direction = environment_direction(params, place);
     result.distance = INFINITY;
-    // By way of the direction, as a ray that finds it does: both techniques then agree on the texel.
+    // Looked up by the direction, as for a ray that goes there, so that both techniques agree on the texel.
     result.radiance = eval_environment(params, emitters, result.direction, &result.pdf);
     return result;
 }
@@ -115,7 +105,7 @@ INLINE Vec3 light_vec3(__global const float *plane, uint stride, uint i) {
     return vec3(plane[i], plane[stride + i], plane[2 * stride + i]);
 }
 
-// `choice` picks the triangle (Walker's alias method), `uv` the point on it.
+// `choice` selects the triangle (Walker's alias method), `uv` the point on it.
 INLINE LightSample sample_triangle_light(const Params *params, const Emitters *emitters, Vec3 position,
                                          Uniform2 uv, float choice) {
     uint stride = params->light_count;
@@ -171,12 +161,14 @@ INLINE LightSample sample_light(const Params *params, const Emitters *emitters, 
 }
 #endif
 
-// Radiance that a hit surface emits towards the ray's origin, weighted against light sampling, which would
-// have found the point with the material's area density. bsdf_pdf 0: nobody else could have found it.
+// Radiance that a surface emits towards the origin of the ray that has met it, weighted against light
+// sampling, which would have found the point with the material's area density. `facing` is the cosine between
+// the geometric normal and the way back along the ray. A `bsdf_pdf` of 0 says that light sampling could not
+// have found the point.
 INLINE Vec3 emitted_radiance(__global const Material *material, float facing, float distance,
                              float bsdf_pdf) {
     int shines = ((material->flags & MATERIAL_DOUBLE_SIDED) != 0u) | (facing > 0.0f);
     float light_pdf = material->light_pdf * distance * distance / MAX(FABS(facing), 1e-7f);
-    float weight = bsdf_pdf > 0.0f ? mis_weight(MAX(bsdf_pdf, 1e-30f), light_pdf) : 1.0f;
-    return scale(shines ? weight : 0.0f, material_vec3(material->emission));
+    float weight = bsdf_sampling_weight(bsdf_pdf, light_pdf);
+    return scale(shines ? weight : 0.0f, vec3_at(material->emission));
 }

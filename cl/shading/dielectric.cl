@@ -1,4 +1,4 @@
-#include "scene/light.cl"
+#include "shading/material.cl"
 #include "shading/medium.cl"
 
 // The boundary between two transparent media, smooth or rough. Directions are local, the normal points to

@@ -11,7 +11,7 @@
 // reach the base, in both directions, so that a white base under a lossless layer reflects exactly
 // everything and the whole stays reciprocal (Kelemen and Szirmay-Kalos 2001).
 //
-// The variant MATT serves scenes without metals and layers: rho / pi is left.
+// The variant MATTE serves scenes without metals and layers, where f is rho / pi.
 
 typedef struct {
     Vec3 base;    // albedo of the Lambertian part, without the layer's share
@@ -19,7 +19,7 @@ typedef struct {
     float alpha;  // GGX roughness
     float metallic;
     __global const float *layer; // E at ALBEDO_TABLE_SIZE cosines from 0 to 1, then 1 / (1 - E_avg)
-} Surface;
+} OpaqueBsdf;
 
 typedef struct {
     Vec3 f_cos;
@@ -32,11 +32,9 @@ typedef struct {
     float pdf;
 } BsdfSample;
 
-INLINE Vec3 material_vec3(__global const float *v) { return vec3(v[0], v[1], v[2]); }
-
-INLINE Surface surface_of(__global const Material *material, __global const float *layer) {
-    Surface s;
-    Vec3 color = material_vec3(material->base_color);
+INLINE OpaqueBsdf bsdf_of(__global const Material *material, __global const float *layer) {
+    OpaqueBsdf s;
+    Vec3 color = vec3_at(material->base_color);
     float metallic = material->metallic;
     float specular = material->specular;
     float r = (material->ior - 1.0f) / (material->ior + 1.0f);
@@ -52,7 +50,7 @@ INLINE Surface surface_of(__global const Material *material, __global const floa
     return s;
 }
 
-INLINE float layer_albedo(const Surface *s, float cosine) {
+INLINE float layer_albedo(const OpaqueBsdf *s, float cosine) {
     float place = CLAMP(cosine, 0.0f, 1.0f) * (float)(ALBEDO_TABLE_SIZE - 1u);
     uint cell = MIN((uint)place, ALBEDO_TABLE_SIZE - 2u);
     float t = place - (float)cell;
@@ -61,7 +59,7 @@ INLINE float layer_albedo(const Surface *s, float cosine) {
 
 // Chance of sampling the specular part: its share of the albedo for wo, kept away from 0 and 1 where both
 // parts exist, so that neither is starved where the estimate is off.
-INLINE float specular_probability(const Surface *s, float layer_wo) {
+INLINE float specular_probability(const OpaqueBsdf *s, float layer_wo) {
     float specular = LERP(layer_wo, MAX(luminance(s->f0), 0.0f), s->metallic);
     float diffuse = luminance(s->base) * (1.0f - layer_wo);
     float share = specular / MAX(specular + diffuse, 1e-12f);
@@ -70,7 +68,7 @@ INLINE float specular_probability(const Surface *s, float layer_wo) {
 }
 
 #ifdef MATTE
-INLINE BsdfValue eval_surface(const Surface *s, Vec3 wo, Vec3 wi) {
+INLINE BsdfValue eval_bsdf(const OpaqueBsdf *s, Vec3 wo, Vec3 wi) {
     int above = (wo.z > 0.0f) & (wi.z > 0.0f);
     float cosine = above ? wi.z : 0.0f;
     BsdfValue result;
@@ -79,7 +77,7 @@ INLINE BsdfValue eval_surface(const Surface *s, Vec3 wo, Vec3 wi) {
     return result;
 }
 
-INLINE BsdfSample sample_surface(const Surface *s, Vec3 wo, Uniform2 direction, float lobe) {
+INLINE BsdfSample sample_bsdf(const OpaqueBsdf *s, Vec3 wo, Uniform2 direction, float lobe) {
     BsdfSample result;
     result.wi = sample_cosine_hemisphere(direction.u, direction.v);
     result.pdf = wo.z > 0.0f ? result.wi.z * INV_PI : 0.0f;
@@ -87,7 +85,7 @@ INLINE BsdfSample sample_surface(const Surface *s, Vec3 wo, Uniform2 direction, 
     return result;
 }
 #else
-INLINE BsdfValue eval_surface(const Surface *s, Vec3 wo, Vec3 wi) {
+INLINE BsdfValue eval_bsdf(const OpaqueBsdf *s, Vec3 wo, Vec3 wi) {
     float a2 = s->alpha * s->alpha;
     Vec3 h = normalize(add(wo, wi));
     float slope = (h.x * h.x + h.y * h.y) / a2 + h.z * h.z;
@@ -112,12 +110,12 @@ INLINE BsdfValue eval_surface(const Surface *s, Vec3 wo, Vec3 wi) {
     return result;
 }
 
-INLINE BsdfSample sample_surface(const Surface *s, Vec3 wo, Uniform2 direction, float lobe) {
+INLINE BsdfSample sample_bsdf(const OpaqueBsdf *s, Vec3 wo, Uniform2 direction, float lobe) {
     int specular = lobe < specular_probability(s, layer_albedo(s, wo.z));
     Vec3 h = sample_visible_normal(wo, s->alpha, direction.u, direction.v);
     Vec3 reflected = subtract(scale(2.0f * dot(wo, h), h), wo);
     Vec3 wi = select(specular, reflected, sample_cosine_hemisphere(direction.u, direction.v));
-    BsdfValue value = eval_surface(s, wo, wi);
+    BsdfValue value = eval_bsdf(s, wo, wi);
     int valid = value.pdf > 0.0f;
     BsdfSample result;
     result.wi = wi;

@@ -1,30 +1,14 @@
-#include "path/state.cl"
+#include "base/scalar.cl"
 
 // The stack of dielectrics that enclose a point: C. M. Schmidt and B. Budge, Simple Nested Dielectrics in
 // Ray Traced Images, JGT 7(2), 2002. It is sorted by priority; its first entry is the medium that is seen,
-// the others are covered by it. Four 16-bit material indices, MEDIUM_NONE where there is none.
+// the others are covered by it. Each entry is the index of a material, or MEDIUM_NONE.
 
 typedef struct {
     uint entry[MEDIUM_STACK_SIZE];
 } MediumStack;
 
-INLINE MediumStack load_medium_stack(const State *state, uint path) {
-    uint low = load_bits(state->paths, PATH_MEDIUM_0 * STRIDE(state) + path);
-    uint high = load_bits(state->paths, PATH_MEDIUM_1 * STRIDE(state) + path);
-    MediumStack stack;
-    stack.entry[0] = low & 0xffffu;
-    stack.entry[1] = low >> 16;
-    stack.entry[2] = high & 0xffffu;
-    stack.entry[3] = high >> 16;
-    return stack;
-}
-
-INLINE void store_medium_stack(const State *state, uint path, const MediumStack *stack) {
-    store_bits(state->paths, PATH_MEDIUM_0 * STRIDE(state) + path, stack->entry[0] | (stack->entry[1] << 16));
-    store_bits(state->paths, PATH_MEDIUM_1 * STRIDE(state) + path, stack->entry[2] | (stack->entry[3] << 16));
-}
-
-// The properties of a medium, or of any material in place of none: all lanes read one.
+// The properties of a medium. MEDIUM_NONE gives those of some material, because all lanes read one.
 INLINE __global const Material *medium_material(__global const Material *materials, uint medium) {
     return &materials[medium == MEDIUM_NONE ? 0u : medium];
 }

@@ -6,13 +6,17 @@ cannot drift. Vectors and bools are left out on purpose: their layout differs be
 vector values keep PoCL from running work-items as SIMD lanes.
 
 The state of paths is kept as *planes*: plane `p` of path `i` is `buffer[p * stride + i]`. Neighbouring
-work-items then touch neighbouring floats, which GPUs coalesce and PoCL vectorises.
+work-items then touch neighbouring floats, which GPUs coalesce and PoCL vectorises. A plane has one meaning;
+`arena` says which planes of a block of paths share memory.
+
+Words that hold several small numbers are described by `Bits`, which the header turns into a shift and a mask
+for each: `FIELD(word, COUNTS_RAY)` reads one in C.
 """
 
 from __future__ import annotations
 
 from enum import IntEnum, IntFlag
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,14 +41,11 @@ NO_INDEX = 0xFFFFFFFF
 WORK_GROUP_SIZE = 64
 """Work-items per group of the path kernels; lists of paths are padded to a multiple of it."""
 
-BLOCK_PATHS = 1024
-"""Paths that one work-item of `trace_blocks` takes from start to end: their state fits into a cache."""
-BLOCK_STRIDE = BLOCK_PATHS + 16
-"""Floats from plane to plane of a block. At a power of two the planes would share the few lines of a nearest
-cache that are kept for their addresses, and drive each other out; this is one line more."""
-
 COMPACT_BLOCK = 64
 """Paths that one work-item of `compact` looks at: few atomics, and enough work-items for a GPU."""
+
+MOST_RAYS = 251
+"""Rays of a path at most: what COUNTS_RAY can hold, with room to spare."""
 
 MIN_ALPHA = 1e-3
 """Least GGX alpha: below it GGX is a mirror to float precision. A dielectric is smooth there, an opaque
@@ -73,13 +74,29 @@ class RayPlane(IntEnum):
     DIRECTION_Z = 5
 
 
-class HitPlane(IntEnum):
-    """Planes of the nearest hit, in world space.
+class RawHitPlane(IntEnum):
+    """Planes of the nearest hit as traversal finds it, before `setup_surface` turns it into a surface.
+
+    OBJECT is NO_INDEX (as uint) where the ray left the scene; the other planes have no meaning then.
+    TRIANGLE is the place of the triangle, see PLACE_PACK. WEIGHT_A to WEIGHT_C belong to its corners and have
+    a common factor, which set-up divides out. DISTANCE counts along the ray, in metres.
+    """
+
+    DISTANCE = 0
+    OBJECT = 1
+    TRIANGLE = 2
+    WEIGHT_A = 3
+    WEIGHT_B = 4
+    WEIGHT_C = 5
+
+
+class SurfacePlane(IntEnum):
+    """Planes of the surface that a ray has met, in world space.
 
     The geometric normal follows the winding of the face; the shading normal lies on its side.
     OFFSET bounds the rounding error of POSITION: a ray that leaves the surface starts that far
-    along the geometric normal. OBJECT is NO_INDEX (as uint) where the ray left the scene. In blocks
-    (trace_blocks.cl) the planes before DISTANCE serve otherwise while rays are traced.
+    along the geometric normal. FACE counts in the mesh. After `intersect` OBJECT is NO_INDEX (as uint) where
+    the ray left the scene.
     """
 
     GEOMETRIC_X = 0
@@ -95,7 +112,7 @@ class HitPlane(IntEnum):
     POSITION_Z = 10
     OBJECT = 11
     MATERIAL = 12
-    TRIANGLE = 13
+    FACE = 13
 
 
 class PathPlane(IntEnum):
@@ -103,9 +120,10 @@ class PathPlane(IntEnum):
 
     BSDF_PDF is the solid-angle density with which the current ray was chosen; 0 marks a ray that
     light sampling could not have found (camera ray, smooth dielectric), whose emission counts whole.
-    COUNTS packs scattering events (bits 0..7), dielectric passages (8..15) and rays (16..23).
+    COUNTS holds three numbers, see COUNTS_BOUNCES.
     MEDIUM_0 and MEDIUM_1 hold the stack of enclosing dielectrics, four 16-bit material indices.
-    RESULT is the place among the block's paths that was the path's first (trace_blocks.cl alone).
+    RESULT is the place of the path's sum in the planes of radiance. Only blocks of paths use it, because a
+    path of a wavefront stays in its place.
     """
 
     THROUGHPUT_R = 0
@@ -124,8 +142,8 @@ class PathPlane(IntEnum):
 class ShadowPlane(IntEnum):
     """Planes of the shadow ray of a path and of the radiance that it brings when nothing is in its way.
 
-    `sample_lights` leaves a light sample in them: direction, distance, radiance of the light, and PDF, the
-    solid-angle density of the direction; shading turns the radiance into what the path gains.
+    `sample_lights` chooses the direction; PDF is its solid-angle density. RADIANCE then is what arrives at
+    the surface, and shading scales it by the share that goes on along the path.
     """
 
     ORIGIN_X = 0
@@ -194,6 +212,51 @@ class MaterialFlag(IntFlag):
     TRANSMISSIVE = 2
 
 
+class Bits(NamedTuple):
+    """Some bits of a word: the lowest of them, and how many they are."""
+
+    shift: int
+    width: int
+
+    @property
+    def mask(self) -> int:
+        """The largest number that they hold."""
+        return (1 << self.width) - 1
+
+
+COUNTS_BOUNCES = Bits(0, 8)
+"""Of PathPlane.COUNTS: the scattering events of the path so far, passages left out."""
+COUNTS_PASSAGES = Bits(8, 8)
+"""Of PathPlane.COUNTS: how often the path has passed a smooth dielectric boundary or was reflected inside."""
+COUNTS_RAY = Bits(16, 8)
+"""Of PathPlane.COUNTS: the number of the ray that the path follows, by which it draws random numbers."""
+
+MEDIUM_LOW = Bits(0, 16)
+"""Of PathPlane.MEDIUM_0 and MEDIUM_1: the upper of two entries of the stack."""
+MEDIUM_HIGH = Bits(16, 16)
+"""Of PathPlane.MEDIUM_0 and MEDIUM_1: the entry below it."""
+
+PLACE_LANE = Bits(0, 3)
+"""Of the place of a triangle: its lane in its pack."""
+PLACE_PACK = Bits(3, 27)
+"""Of the place of a triangle: its pack, counted over all meshes, or over the top level."""
+PLACE_ON_TOP = Bits(30, 1)
+"""Of the place of a triangle: 1 where its pack belongs to the top level. This is the bit of NODE_PACK."""
+
+TURNS_FIRST = Bits(0, 2)
+"""Of QUAD.turns: which corner of the triangle ABC is A."""
+TURNS_SECOND = Bits(2, 2)
+"""Of QUAD.turns: which corner of the triangle ACD is A."""
+TURNS_AXIS_B = Bits(4, 2)
+"""Of QUAD.turns, for a side of a parallelepiped: the axis of its local coordinates that leads from A to B."""
+TURNS_BACK_B = Bits(6, 1)
+"""Of QUAD.turns: 1 where that axis leads from B to A."""
+TURNS_AXIS_D = Bits(7, 2)
+"""Of QUAD.turns, for a side of a parallelepiped: the axis of its local coordinates that leads from A to D."""
+TURNS_BACK_D = Bits(9, 1)
+"""Of QUAD.turns: 1 where that axis leads from D to A."""
+
+
 def _packed(fields: list[Any]) -> np.dtype[np.void]:
     return np.dtype(fields, align=False)
 
@@ -228,11 +291,11 @@ QUAD = _packed(
         # A parallelogram or a triangle in world space: corners A, B, C, D on the way around, x, y and z of
         # each. A triangle has C in place of D.
         ("vertex", np.float32, (12,)),
-        # Places of the triangles ABC and ACD in the packs of the top level, as HIT_TRIANGLE has it.
+        # Places of the triangles ABC and ACD in the packs of the top level, see PLACE_PACK.
         ("place", np.uint32, (2,)),
         ("object", np.uint32),
-        # Which corner of these triangles A is, two bits each; above them, for a side of a parallelepiped,
-        # `Facets.along`.
+        # How the corners of the triangles, and the local axes of a parallelepiped, lie to A, B, C and D: see
+        # TURNS_FIRST and those after it.
         ("turns", np.uint32),
     ]
 )
@@ -242,15 +305,15 @@ PARALLELEPIPED = _packed(
         # A parallelepiped in world space. Its local coordinates are between 0 and 1 inside.
         ("corner", np.float32, (3,)),
         ("local_from_world", np.float32, (9,)),  # 3 x 3, row by row, of the way from that corner
-        ("first_side", np.uint32),  # of six facets: where local x is 0, where it is 1, where y is 0 ...
+        ("first_side", np.uint32),  # of six quads: where local x is 0, where it is 1, where y is 0 ...
     ]
 )
 
 CLUSTER = _packed(
     [
-        # Facets that stand together: least and greatest x, y and z; parallelepipeds; parallelograms, then
-        # triangles.
-        ("bounds", np.float32, (6,)),
+        # Parallelepipeds and quads that stand together. The quads have the parallelograms in front, the
+        # triangles from `first_triangle` on.
+        ("bounds", np.float32, (6,)),  # least and greatest x, y and z
         ("first_parallelepiped", np.uint32),
         ("parallelepiped_end", np.uint32),
         ("first", np.uint32),
@@ -383,16 +446,21 @@ def _c_enum(enum: type[IntEnum] | type[IntFlag], prefix: str) -> list[str]:
     return [_c_constant(f"{prefix}_{member.name}", int(member)) for member in enum]
 
 
+def _c_bits(name: str, bits: Bits) -> list[str]:
+    return [_c_constant(f"{name}_SHIFT", bits.shift), _c_constant(f"{name}_MASK", bits.mask)]
+
+
 def c_header() -> str:
-    """OpenCL C text of every constant, plane index and struct in this module."""
-    lines = [
-        _c_constant(name, value)
-        for name, value in sorted(globals().items())
-        if name.isupper() and not name.startswith("_") and isinstance(value, int | float)
-    ]
+    """OpenCL C text of every constant, plane index, bit field and struct in this module."""
+    named = sorted((name, value) for name, value in globals().items() if name[0].isalpha() and name.isupper())
+    lines = [_c_constant(name, value) for name, value in named if isinstance(value, int | float)]
+    for name, value in named:
+        if isinstance(value, Bits):
+            lines += _c_bits(name, value)
     for enum, prefix in (
         (RayPlane, "RAY"),
-        (HitPlane, "HIT"),
+        (RawHitPlane, "RAW_HIT"),
+        (SurfacePlane, "SURFACE"),
         (PathPlane, "PATH"),
         (ShadowPlane, "SHADOW"),
         (LightPlane, "LIGHT"),

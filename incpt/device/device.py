@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
-from incpt.core import layout
+from incpt.core import arena, layout
 from incpt.core.errors import DeviceError, InputError
 from incpt.device import pocl, program
 
@@ -44,11 +44,12 @@ class Device:
     """An OpenCL device with the kernels built for it.
 
     `choice` is an index or a part of the name as `incpt devices` shows them; None takes INCPT_DEVICE,
-    else the first GPU, else the first device. Raises InputError where no device has that name, and
-    DeviceError where there is none at all.
+    else the first GPU, else the first device. `features` (program.FEATURES) are part of every program that it
+    builds. Raises InputError where no device has that name, and DeviceError where there is none at all.
     """
 
-    def __init__(self, choice: str | int | None = None) -> None:
+    def __init__(self, choice: str | int | None = None, features: tuple[str, ...] = ()) -> None:
+        self.features = features
         self.cl_device = choose(choice)
         pocl.require_linker(self.cl_device)
         self.target = pocl.name_target(self.cl_device)
@@ -80,6 +81,12 @@ class Device:
         """Whether kernels are compiled for a CPU by a clang whose intrinsics and loop pragmas they may use:
         that of PoCL, and that of Intel's runtime."""
         return self.is_cpu and (self.is_pocl or "intel" in self.cl_device.platform.name.lower())
+
+    @cached_property
+    def block_paths(self) -> int | None:
+        """How many paths a block takes (arena.py). None: kernels over blocks, which are made for the
+        compilers and caches of CPUs, do not run here, or local memory is too small."""
+        return arena.block_paths(self.cl_device.local_mem_size) if self.is_clang_cpu else None
 
     @cached_property
     def tuning(self) -> Tuning:
@@ -175,8 +182,9 @@ class Device:
 
     def program_text(self, file: str, features: tuple[str, ...] = ()) -> str:
         """The whole source of the program around the file of cl/ called `file`, as this device builds it."""
-        own = ("CLANG_CPU",) if self.is_clang_cpu else ()
-        return program.program_text(program.files()[file], (*features, *own), self.target)
+        own = (*self.features, *(("CLANG_CPU",) if self.is_clang_cpu else ()))
+        paths = self.block_paths or arena.BLOCK_SIZES[0]
+        return program.program_text(program.files()[file], (*features, *own), self.target, paths)
 
     def build(self, text: str, what: str) -> cl.Program:
         """The program of that text; `what` names it in an error. Raises DeviceError with the compiler's first

@@ -1,7 +1,7 @@
 """Programs: from the files of cl/ to the text that a device's compiler gets.
 
-A program is one file of cl/ with its includes put in, behind the header of `layout` and the names of its
-*features*: preprocessor names that choose a variant of it.
+A program is one file of cl/ with its includes put in, behind the headers of `layout`, `bindings` and `arena`
+and the names of its *features*: preprocessor names that choose a variant of it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from functools import cache
 from importlib import resources
 from importlib.resources.abc import Traversable
 
-from incpt.core import layout
+from incpt.core import arena, bindings, layout
 
 # Relaxed arithmetic only where NaN and infinity keep their meaning: -cl-fast-relaxed-math loses rays.
 BUILD_OPTIONS = ("-cl-std=CL1.2", "-cl-mad-enable", "-cl-no-signed-zeros")
@@ -21,13 +21,47 @@ BUILD_OPTIONS = ("-cl-std=CL1.2", "-cl-mad-enable", "-cl-no-signed-zeros")
 _INCLUDE = re.compile(r'^#include "([\w/]+)\.cl"$', re.MULTILINE)
 
 
-def program_text(file: str, features: tuple[str, ...] = (), target: str | None = None) -> str:
-    """The whole source of the program around cl/`file`.cl.
+FEATURES = {
+    "CLANG_CPU": "The compiler is clang for a CPU, whose intrinsics and loop pragmas are at hand.",
+    "PORTABLE_LANES": "Instructions of AVX-512 are not written by hand, as on processors without them.",
+    "ENVIRONMENT_IMAGE": "The environment is an image, of which lights are sampled.",
+    "TRIANGLE_LIGHTS": "There are emissive triangles, of which lights are sampled.",
+    "MEDIA": "There are materials that let light through.",
+    "SMOOTH_MEDIA": "No material that lets light through is rough.",
+    "CLEAR_MEDIA": "No material that lets light through absorbs any.",
+    "MATTE": "Opaque surfaces are Lambertian: no metal, and no layer.",
+    "FLAT": "No mesh has normals of its own.",
+    "TOP_LEVEL_ONLY": "Every triangle lies in the packs of the top level, in world space.",
+    "BRUTE_FORCE": "The triangles of the top level are so few that blocks test them without a tree.",
+    "EMISSION_ONLY": "No path goes on after this ray, so that surfaces only emit.",
+    "COUNT_VISITS": "Traversal counts the nodes and packs that it tests, for the benchmark of rays.",
+    "MIS_ONLY_LIGHT": "Light sampling alone brings light, where it can, for the tests of its weights.",
+    "MIS_ONLY_BSDF": "BSDF sampling alone brings light, for the tests of its weights.",
+    "CHANNELS": "With a number: how many floats a pass of the film has for each pixel.",
+    "SQUARES": "A pass of the film sums up squares.",
+    "KEEP_SUMS": "The picture of a pass of the film is not divided by the number of samples.",
+}
+"""Every preprocessor name that chooses a variant of a program, and what it says."""
 
-    The target is part of the text, so that a kernel cached for another processor is not taken.
+
+def program_text(
+    file: str,
+    features: tuple[str, ...] = (),
+    target: str | None = None,
+    block_paths: int = arena.BLOCK_SIZES[0],
+) -> str:
+    """The whole source of the program around cl/`file`.cl, for blocks of `block_paths` paths.
+
+    Each of the features is a name, or a name and its value ("CHANNELS 3").
+    The target is part of the text, so that a kernel cached for another processor is not taken. Raises
+    KeyError for a feature that is not in FEATURES.
     """
+    for name in features:
+        if name.split()[0] not in FEATURES:
+            raise KeyError(f"no kernel knows the feature {name}")
     defines = "".join(f"#define {name}\n" for name in features)
-    return f"// target: {target}\n{defines}{layout.c_header()}\n{source(file)}"
+    headers = layout.c_header() + bindings.c_header() + arena.c_header(block_paths)
+    return f"// target: {target}\n{defines}{headers}\n{source(file)}"
 
 
 def source(file: str, included: set[str] | None = None) -> str:

@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from incpt.accel import bvh, top_level
-from incpt.core import affine, layout
+from incpt.core import affine, bindings, layout
 from incpt.core.errors import InputError
-from incpt.core.layout import HitPlane, PathClass, PathPlane, RayPlane, ShadowPlane
+from incpt.core.layout import PathClass, PathPlane, RayPlane, ShadowPlane, SurfacePlane
 from incpt.device.device import Device
 from incpt.scene import model, shapes
 from incpt.scene.mesh import Mesh
@@ -29,15 +29,15 @@ class Hits:
     planes: Floats
     classes: npt.NDArray[np.uint32]
 
-    def floats(self, first: HitPlane, count: int = 1) -> Floats:
+    def floats(self, first: SurfacePlane, count: int = 1) -> Floats:
         return self.planes[first] if count == 1 else self.planes[first : first + count].T
 
-    def uints(self, plane: HitPlane) -> npt.NDArray[np.uint32]:
+    def uints(self, plane: SurfacePlane) -> npt.NDArray[np.uint32]:
         return self.planes[plane].view(np.uint32)
 
     @property
     def hit(self) -> npt.NDArray[np.bool_]:
-        return self.uints(HitPlane.OBJECT) != layout.NO_INDEX
+        return self.uints(SurfacePlane.OBJECT) != layout.NO_INDEX
 
 
 @dataclass
@@ -78,24 +78,31 @@ class World:
             record["visible"] = obj.visible
         material = np.zeros(1, layout.MATERIAL)
         material["flags"] = self.material_flags
-        upload = self.device.upload
-        no_packs = np.zeros(1, layout.TRIANGLE_PACK)
-        tables = [
-            top.nodes,
-            no_packs,
-            np.concatenate(nodes or [top.nodes]),
-            np.concatenate(packs or [np.zeros(1)]),
-        ]
-        self.tables = [upload(table) for table in (*tables, records, material)]
-        self.normals = upload(np.concatenate(normals))
+        tables = {
+            "top_nodes": top.nodes,
+            "top_packs": np.zeros(1, layout.TRIANGLE_PACK),
+            "nodes": np.concatenate(nodes or [top.nodes]),
+            "packs": np.concatenate(packs or [np.zeros(1, layout.TRIANGLE_PACK)]),
+            "objects": records,
+            "normals": np.concatenate(normals),
+            "materials": material,
+            "layers": np.zeros(1, np.float32),
+        }
+        self.buffers = {name: self.device.upload(table) for name, table in tables.items()}
 
-    def _launch(self, name: str, count: int, *buffers: object) -> None:
+    def _launch(self, name: str, count: int, planes: dict[str, Floats]) -> dict[str, Floats]:
+        """Launches a kernel over `count` paths; returns the planes of each kind afterwards."""
         params = np.zeros((), layout.PARAMS)
         params["path_stride"] = params["buffer_stride"] = count
-        kernel = self.device.kernel(name)
+        state = {
+            argument.name: np.zeros(1, np.float32) for argument in bindings.PATH_STATE.arguments
+        } | planes
+        buffers = {kind: self.device.upload(array) for kind, array in state.items()}
         path_list = self.device.upload(np.arange(count, dtype=np.uint32))
-        tables = self.tables[: 5 if name == "trace_shadow" else 6]
-        self.device.launch(kernel, count, params, np.uint32(count), path_list, *tables, *buffers)
+        values = {"params": params, "count": count, "list": path_list, **self.buffers, **buffers}
+        arguments = bindings.arguments(bindings.KERNELS[name], values)
+        self.device.launch(self.device.kernel(name), count, *arguments)
+        return {kind: self.device.read(buffers[kind], array.copy()) for kind, array in planes.items()}
 
     def intersect(self, origins: Floats, directions: Floats, medium: int = layout.NO_INDEX) -> Hits:
         count = len(origins)
@@ -104,11 +111,10 @@ class World:
         rays[RayPlane.DIRECTION_X : RayPlane.DIRECTION_Z + 1] = directions.T
         paths = np.zeros((len(PathPlane), count), np.float32)
         paths[PathPlane.MEDIUM_0].view(np.uint32)[:] = medium
-        hits = np.zeros((len(HitPlane), count), np.float32)
-        path_buffer, hit_buffer = self.device.upload(paths), self.device.upload(hits)
-        self._launch("intersect", count, self.normals, self.device.upload(rays), path_buffer, hit_buffer)
-        classes = self.device.read(path_buffer, paths)[PathPlane.CLASS].view(np.uint32)
-        return Hits(self.device.read(hit_buffer, hits), classes)
+        # Distances of rays that meet nothing are not written.
+        surfaces = np.full((len(SurfacePlane), count), np.inf, np.float32)
+        after = self._launch("intersect", count, {"rays": rays, "paths": paths, "surfaces": surfaces})
+        return Hits(after["surfaces"], after["paths"][PathPlane.CLASS].view(np.uint32))
 
     def occlude(self, origins: Floats, directions: Floats, distance: Floats | float) -> Floats:
         """(N, 3) radiance that arrives where (1, 2, 3) is sent."""
@@ -119,9 +125,7 @@ class World:
         shadows[ShadowPlane.DISTANCE] = distance
         shadows[ShadowPlane.RADIANCE_R : ShadowPlane.RADIANCE_B + 1] = np.array([[1], [2], [3]])
         radiance = np.zeros((3, count), np.float32)
-        buffer = self.device.upload(radiance)
-        self._launch("trace_shadow", count, self.device.upload(shadows), buffer)
-        return self.device.read(buffer, radiance).T
+        return self._launch("trace_shadow", count, {"shadows": shadows, "radiance": radiance})["radiance"].T
 
 
 def brute_force(obj: model.Object, origins: Floats, directions: Floats) -> npt.NDArray[np.float64]:
@@ -161,12 +165,12 @@ def assert_agrees(world: World, origins: Floats, directions: Floats) -> Hits:
     distances = [brute_force(obj, origins, directions) for obj in world.objects if obj.visible]
     expected = np.min([d.min(axis=1) for d in distances], axis=0)
     hits = world.intersect(origins, directions)
-    actual = hits.floats(HitPlane.DISTANCE)
+    actual = hits.floats(SurfacePlane.DISTANCE)
     differs = ~np.isclose(actual, expected, rtol=1e-3, atol=1e-4)
     assert differs.mean() <= 2e-3, f"{differs.sum()} of {len(origins)} rays differ from brute force"
     some = hits.hit & ~differs
     points = origins + directions * actual[:, None]
-    np.testing.assert_allclose(hits.floats(HitPlane.POSITION_X, 3)[some], points[some], atol=2e-3)
+    np.testing.assert_allclose(hits.floats(SurfacePlane.POSITION_X, 3)[some], points[some], atol=2e-3)
     free = world.occlude(origins, directions, np.inf)
     np.testing.assert_array_equal(free, np.where(hits.hit[:, None], 0, [[1, 2, 3]]))
     return hits
@@ -373,12 +377,15 @@ def test_shapes_and_their_normals(device: Device, name: str, placement: dict[str
     origins, directions = random_rays(rng, 1500, 3)
     hits = assert_agrees(World(device, [obj]), origins, directions)
     some = hits.hit
-    mesh, faces = obj.mesh, hits.uints(HitPlane.TRIANGLE)[some]
+    mesh, faces = obj.mesh, hits.uints(SurfacePlane.FACE)[some]
     a, b, c = mesh.vertices[mesh.faces[faces]].astype(np.float64).transpose(1, 0, 2)
     inverse = np.linalg.inv(obj.world_from_object[:, :3])
     normal = np.cross(b - a, c - a) @ inverse  # row vectors: the inverse transpose
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    geometric, shading = hits.floats(HitPlane.GEOMETRIC_X, 3)[some], hits.floats(HitPlane.SHADING_X, 3)[some]
+    geometric, shading = (
+        hits.floats(SurfacePlane.GEOMETRIC_X, 3)[some],
+        hits.floats(SurfacePlane.SHADING_X, 3)[some],
+    )
     np.testing.assert_allclose(geometric, normal, atol=1e-5)
     np.testing.assert_allclose(np.linalg.norm(shading, axis=1), 1, atol=1e-5)
     assert (np.sum(shading * geometric, axis=1) >= 0).all()
@@ -391,9 +398,9 @@ def test_shading_normals_of_a_sphere_point_from_its_centre(device: Device) -> No
     origins, directions = random_rays(np.random.default_rng(12), 2000, 0.5)
     hits = World(device, [obj]).intersect(origins + np.float32([1, 2, 3]), directions)
     assert hits.hit.all()
-    outward = hits.floats(HitPlane.POSITION_X, 3) - [1, 2, 3]
+    outward = hits.floats(SurfacePlane.POSITION_X, 3) - [1, 2, 3]
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-    np.testing.assert_allclose(hits.floats(HitPlane.SHADING_X, 3), outward, atol=2e-3)
+    np.testing.assert_allclose(hits.floats(SurfacePlane.SHADING_X, 3), outward, atol=2e-3)
 
 
 @pytest.mark.slow
@@ -413,7 +420,7 @@ def test_many_objects(device: Device, count: int) -> None:
     ]
     origins, directions = random_rays(rng, 300, 4)
     hits = assert_agrees(World(device, objects), origins, directions)
-    seen = np.unique(hits.uints(HitPlane.OBJECT)[hits.hit])
+    seen = np.unique(hits.uints(SurfacePlane.OBJECT)[hits.hit])
     assert all(objects[i].visible for i in seen)
 
 
@@ -492,7 +499,7 @@ def test_axis_parallel_rays_are_watertight(device: Device, name: str) -> None:
     o, d = np.concatenate(origins).astype(np.float32), np.concatenate(directions).astype(np.float32)
     hits = world.intersect(o, d)
     assert hits.hit.all()
-    assert np.isfinite(hits.planes[: HitPlane.OBJECT]).all()
+    assert np.isfinite(hits.planes[: SurfacePlane.OBJECT]).all()
 
 
 def test_axis_parallel_rays_in_box_planes(device: Device) -> None:
@@ -509,7 +516,7 @@ def test_axis_parallel_rays_in_box_planes(device: Device) -> None:
     directions = np.tile(np.float32([0, -1, 0]), (len(origins), 1))
     hits = World(device, [as_object(floor)]).intersect(origins, directions)
     assert hits.hit.all()
-    np.testing.assert_array_equal(hits.floats(HitPlane.DISTANCE), 1)
+    np.testing.assert_array_equal(hits.floats(SurfacePlane.DISTANCE), 1)
 
 
 def test_degenerate_faces_are_never_hit(device: Device) -> None:
@@ -528,9 +535,9 @@ def test_degenerate_faces_are_never_hit(device: Device) -> None:
     both, alone = World(device, [as_object(mesh)]), World(device, [as_object(good)])
     directions = directions_to(targets, origins)
     hits = both.intersect(origins, directions)
-    assert (hits.uints(HitPlane.TRIANGLE)[hits.hit] < 50).all()
+    assert (hits.uints(SurfacePlane.FACE)[hits.hit] < 50).all()
     np.testing.assert_array_equal(hits.hit, alone.intersect(origins, directions).hit)
-    assert np.isfinite(hits.planes[: HitPlane.OBJECT][:, hits.hit]).all()
+    assert np.isfinite(hits.planes[: SurfacePlane.OBJECT][:, hits.hit]).all()
 
 
 @pytest.mark.parametrize("exponent", [-9, -6, 6, 8])
@@ -542,8 +549,8 @@ def test_sizes(device: Device, exponent: int) -> None:
     expected = World(device, [as_object(unit)]).intersect(origins, directions)
     scaled = World(device, [as_object(mesh)]).intersect(origins * np.float32(10.0**exponent), directions)
     assert np.mean(expected.hit != scaled.hit) < 2e-3
-    same = expected.uints(HitPlane.TRIANGLE) == scaled.uints(HitPlane.TRIANGLE)
-    normals = [h.floats(HitPlane.GEOMETRIC_X, 3)[same & expected.hit] for h in (expected, scaled)]
+    same = expected.uints(SurfacePlane.FACE) == scaled.uints(SurfacePlane.FACE)
+    normals = [h.floats(SurfacePlane.GEOMETRIC_X, 3)[same & expected.hit] for h in (expected, scaled)]
     np.testing.assert_allclose(*normals, atol=1e-3)
 
 
@@ -575,9 +582,9 @@ def test_rays_from_a_surface_never_meet_it_again(
     targets = affine.apply(obj.world_from_object, a + np.sqrt(u) * ((b - a) + v * (c - b)))
     origins = (targets + rng.normal(size=targets.shape) * rng.choice([0.1, 1, 30], (20000, 1))).astype("f4")
     hits = world.intersect(origins, directions_to(targets, origins))
-    position = hits.floats(HitPlane.POSITION_X, 3)[hits.hit]
-    normal = hits.floats(HitPlane.GEOMETRIC_X, 3)[hits.hit]
-    offset = hits.floats(HitPlane.OFFSET)[hits.hit][:, None]
+    position = hits.floats(SurfacePlane.POSITION_X, 3)[hits.hit]
+    normal = hits.floats(SurfacePlane.GEOMETRIC_X, 3)[hits.hit]
+    offset = hits.floats(SurfacePlane.OFFSET)[hits.hit][:, None]
     away = rng.normal(size=normal.shape)
     away -= normal * np.sum(away * normal, axis=1, keepdims=True)
     away += normal * 10 ** rng.uniform(-7, 1, (len(away), 1))
@@ -586,7 +593,7 @@ def test_rays_from_a_surface_never_meet_it_again(
         start = (position + side * offset * normal).astype(np.float32)
         direction = (away - (1 - side) * normal * np.sum(away * normal, axis=1, keepdims=True)).astype("f4")
         again = world.intersect(start, direction)
-        same = again.hit & (again.uints(HitPlane.TRIANGLE) == hits.uints(HitPlane.TRIANGLE)[hits.hit])
+        same = again.hit & (again.uints(SurfacePlane.FACE) == hits.uints(SurfacePlane.FACE)[hits.hit])
         assert not same.any(), f"{same.sum()} of {len(same)} rays on side {side}"
     extent = np.linalg.norm(np.diff(obj.world_bounds, axis=0)) + np.abs(obj.world_bounds).max()
     assert (offset > 0).all() and offset.max() < 3e-5 * extent, "shadows would detach"

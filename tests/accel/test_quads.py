@@ -15,10 +15,11 @@ from hypothesis import strategies as st
 
 from incpt.accel import clusters, quads
 from incpt.benchmarks.kit.scenes import crowd, icosphere
-from incpt.core import affine, layout
-from incpt.core.layout import HitPlane
+from incpt.core import affine, bindings, layout
+from incpt.core.layout import SurfacePlane
 from incpt.device.device import Device
-from incpt.render.wavefront import block_arguments, traces_in_blocks
+from incpt.render import blocks
+from incpt.render.blocks import traces_in_blocks
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
 from incpt.scene.material import Material
@@ -305,43 +306,49 @@ def test_faces_without_area_are_left_out(device: Device) -> None:
 
 _KERNEL = """
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
-hits_of_rays(const uint count, __global const float *given, BLOCK_PARAMETERS, __global float *planes) {
-    Block block = BLOCK(0, 0);
+surfaces_of_rays(const uint count, __global const float *given, BLOCK_PARAMETERS, __global float *planes) {
+    const Block block = BLOCK_OF(0, 0);
     const uint first = (uint)get_group_id(0) * BLOCK_PATHS, size = MIN(count - first, BLOCK_PATHS);
     for (uint i = 0; i < size; i++) {
         for (uint p = 0; p < RAY_PLANES; p++)
             block.state.rays[p * BLOCK_STRIDE + i] = given[p * count + first + i];
-        store_bits(block.state.paths, PATH_CLASS * BLOCK_STRIDE + i, CLASS_LIVE);
-        block.results[i] = i;
+        store_class(&block.state, i, CLASS_LIVE);
+        store_result(&block.state, i, i);
+        ((__global uint *)planes)[SURFACE_OBJECT * count + first + i] = NO_INDEX;
     }
-    for (uint i = 0; i < size; i++)
-        ((__global uint *)planes)[HIT_OBJECT * count + first + i] = NO_INDEX;
     RayEnds ends;
-    sort_by_ends(&block, trace_rays(&block, size, true), &ends);
+    classify_hits(&block, trace_rays(&block, size, true), &ends);
     const uint hit_count = compact_hits(&block, &ends);
     setup_surfaces(&block, hit_count);
-    for (uint p = 0; p < HIT_PLANES; p++)
+    for (uint p = 0; p < SURFACE_PLANES; p++)
         for (uint i = 0; i < hit_count; i++)
-            planes[p * count + first + block.results[i]] = block.state.hits[p * BLOCK_STRIDE + i];
+            planes[p * count + first + load_result(&block.state, i)] =
+                block.state.surfaces[p * BLOCK_STRIDE + i];
 }
 """
 
 
 def hits(device: Device, scene: Scene, rays: Floats, by_brute_force: bool) -> Floats:
-    """(HIT_PLANES, N) of what `rays` (6, N) meet, by brute force or by the way of trees."""
+    """(SURFACE_PLANES, N) of what `rays` (6, N) meet, by brute force or by the way of trees."""
     tables = described(device, scene)
     assert "BRUTE_FORCE" in tables.variant
     features = tuple(name for name in tables.variant if by_brute_force or name != "BRUTE_FORCE")
-    arguments = block_arguments(tables)
-    if not by_brute_force:
-        arguments[0] = tables.buffer("top_nodes")
-    program = cl.Program(device.context, device.program_text("trace_blocks", features) + _KERNEL)
-    kernel = cl.Kernel(program.build(options=["-cl-std=CL1.2"]), "hits_of_rays")
     count = rays.shape[1]
-    planes = device.empty(4 * len(HitPlane) * count)
-    blocks = -(-count // layout.BLOCK_PATHS)
-    device.launch(kernel, blocks, np.uint32(count), device.upload(rays), *arguments, planes, work_group=1)
-    return device.read(planes, np.empty((len(HitPlane), count), np.float32))
+    planes = device.empty(4 * len(SurfacePlane) * count)
+    values = {"count": count, "given": device.upload(rays), "planes": planes}
+    if not by_brute_force:
+        values["top_nodes"] = tables.buffer("top_nodes")
+    groups = (
+        bindings.Group(
+            "OWN", None, (bindings.Argument("count", "uint", ""), bindings.Argument("given", "*", ""))
+        ),
+        *bindings.BLOCK,
+        bindings.Group("RESULT", None, (bindings.Argument("planes", "*", ""),)),
+    )
+    text = device.program_text("trace_blocks", features) + _KERNEL
+    kernel = cl.Kernel(device.build(text, "the test"), "surfaces_of_rays")
+    blocks.launch(device, kernel, groups, count, values, tables)
+    return device.read(planes, np.empty((len(SurfacePlane), count), np.float32))
 
 
 def rays_at(scene: Scene, count: int, seed: int, size: float = 1.0) -> Floats:
@@ -361,21 +368,21 @@ def rays_at(scene: Scene, count: int, seed: int, size: float = 1.0) -> Floats:
 
 def check_brute_force(device: Device, scene: Scene, rays: Floats) -> None:
     forced, walked = (hits(device, scene, rays, way) for way in (True, False))
-    found, expected = (h[HitPlane.OBJECT].view(np.uint32) != layout.NO_INDEX for h in (forced, walked))
+    found, expected = (h[SurfacePlane.OBJECT].view(np.uint32) != layout.NO_INDEX for h in (forced, walked))
     np.testing.assert_array_equal(found, expected)
     assert 0.05 < found.mean() < 1
     forced, walked = forced[:, found], walked[:, found]
-    scale = np.abs(walked[HitPlane.POSITION_X : HitPlane.POSITION_Z + 1]).max()
-    distances = (hit[HitPlane.DISTANCE] for hit in (forced, walked))
+    scale = np.abs(walked[SurfacePlane.POSITION_X : SurfacePlane.POSITION_Z + 1]).max()
+    distances = (hit[SurfacePlane.DISTANCE] for hit in (forced, walked))
     np.testing.assert_allclose(*distances, rtol=1e-5, atol=3e-7 * scale)
     same = np.ones(found.sum(), np.bool_)
-    for plane in (HitPlane.OBJECT, HitPlane.TRIANGLE, HitPlane.MATERIAL):
+    for plane in (SurfacePlane.OBJECT, SurfacePlane.FACE, SurfacePlane.MATERIAL):
         same &= forced[plane].view(np.uint32) == walked[plane].view(np.uint32)
     assert same.mean() > 0.99  # the others lie on an edge
     for first, atol in (
-        (HitPlane.POSITION_X, 3e-6 * scale),
-        (HitPlane.GEOMETRIC_X, 1e-6),
-        (HitPlane.SHADING_X, 1e-4),
+        (SurfacePlane.POSITION_X, 3e-6 * scale),
+        (SurfacePlane.GEOMETRIC_X, 1e-6),
+        (SurfacePlane.SHADING_X, 1e-4),
     ):
         np.testing.assert_allclose(
             forced[first : first + 3, same], walked[first : first + 3, same], rtol=0, atol=atol
@@ -434,7 +441,7 @@ def test_no_ray_slips_through_the_seams_of_parallelograms(device: Device) -> Non
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     rays = np.ascontiguousarray(np.hstack([origin, direction]).T, np.float32)
     found = hits(device, scene, rays, by_brute_force=True)
-    assert (found[HitPlane.OBJECT].view(np.uint32) == 0).all()
+    assert (found[SurfacePlane.OBJECT].view(np.uint32) == 0).all()
 
 
 def test_rays_along_the_sides_of_a_parallelepiped(device: Device) -> None:
@@ -449,8 +456,8 @@ def test_rays_along_the_sides_of_a_parallelepiped(device: Device) -> None:
     rays = np.ascontiguousarray(np.hstack([origins, directions]).T, np.float32)
     scene = scene_of([Object("room", shape("cube"), "white", scale=(2, 2, 2))])
     found, expected = (hits(device, scene, rays, way) for way in (True, False))
-    assert (found[HitPlane.OBJECT].view(np.uint32) == 0).all()
-    distances = (planes[HitPlane.DISTANCE] for planes in (found, expected))
+    assert (found[SurfacePlane.OBJECT].view(np.uint32) == 0).all()
+    distances = (planes[SurfacePlane.DISTANCE] for planes in (found, expected))
     np.testing.assert_allclose(*distances, rtol=1e-5, atol=1e-6)
 
 
@@ -485,20 +492,23 @@ def test_rays_from_a_side_never_meet_it_again(device: Device, name: str, placeme
         return hits(device, scene, rays, by_brute_force=True)
 
     first = met(origins, targets - origins)
-    first = first[:, first[HitPlane.OBJECT].view(np.uint32) != layout.NO_INDEX]
+    first = first[:, first[SurfacePlane.OBJECT].view(np.uint32) != layout.NO_INDEX]
     assert len(first.T) > 15000
-    assert len(np.unique(first[HitPlane.TRIANGLE].view(np.uint32))) > len(scene.objects[0].mesh.faces) / 2
-    position = first[HitPlane.POSITION_X : HitPlane.POSITION_Z + 1].T
-    normal = first[HitPlane.GEOMETRIC_X : HitPlane.GEOMETRIC_Z + 1].T
+    assert len(np.unique(first[SurfacePlane.FACE].view(np.uint32))) > len(scene.objects[0].mesh.faces) / 2
+    position = first[SurfacePlane.POSITION_X : SurfacePlane.POSITION_Z + 1].T
+    normal = first[SurfacePlane.GEOMETRIC_X : SurfacePlane.GEOMETRIC_Z + 1].T
     away = rng.normal(size=normal.shape)
     away -= normal * np.sum(away * normal, axis=1, keepdims=True)
     up = normal * 10 ** rng.uniform(-7, 1, (len(away), 1))
     for side in (1, -1):
-        again = met(position + side * first[HitPlane.OFFSET][:, None] * normal, away + side * up)
-        hit = again[HitPlane.OBJECT].view(np.uint32) != layout.NO_INDEX
+        again = met(position + side * first[SurfacePlane.OFFSET][:, None] * normal, away + side * up)
+        hit = again[SurfacePlane.OBJECT].view(np.uint32) != layout.NO_INDEX
         if name == "cube" and side == -1:
             assert hit.mean() > 0.99  # the others have left along an edge
-            same = np.sum(again[HitPlane.GEOMETRIC_X : HitPlane.GEOMETRIC_Z + 1].T * normal, axis=1) > 0.999
+            same = (
+                np.sum(again[SurfacePlane.GEOMETRIC_X : SurfacePlane.GEOMETRIC_Z + 1].T * normal, axis=1)
+                > 0.999
+            )
             hit &= same
         assert not hit.any(), (side, hit.sum())
 

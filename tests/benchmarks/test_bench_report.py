@@ -24,8 +24,8 @@ from incpt.benchmarks.measures.traversal import Rays, Tracer, camera_rays, scatt
 from incpt.cli import main
 from incpt.core.errors import InputError
 from incpt.device.device import Device
+from incpt.render.blocks import traces_in_blocks
 from incpt.render.session import Session
-from incpt.render.wavefront import traces_in_blocks
 from incpt.scene.material import Material
 from incpt.scene.model import Scene
 

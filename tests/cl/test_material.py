@@ -32,7 +32,7 @@ MATERIALS = {
 }
 ANGLES_DEG = (0.0, 35.0, 70.0, 86.0)
 
-_SURFACE = "Surface s = surface_of(material, layer); Vec3 wo = vec3(ox[i], oy[i], oz[i]);"
+_SURFACE = "OpaqueBsdf s = bsdf_of(material, layer); Vec3 wo = vec3(ox[i], oy[i], oz[i]);"
 
 
 def _arguments(material: Material) -> dict[str, npt.NDArray[np.generic]]:
@@ -48,7 +48,7 @@ def _components(prefix: str, w: Array, count: int) -> dict[str, npt.NDArray[np.f
 def evaluate(material: Material, wo: Array, wi: Array, features: tuple[str, ...] = ()) -> tuple[Array, Array]:
     """f cos (3, N) and pdf (N,) for directions (3,) or (3, N)."""
     count = max(np.reshape(wo, (3, -1)).shape[1], np.reshape(wi, (3, -1)).shape[1])
-    body = _SURFACE + """BsdfValue b = eval_surface(&s, wo, vec3(ix[i], iy[i], iz[i]));
+    body = _SURFACE + """BsdfValue b = eval_bsdf(&s, wo, vec3(ix[i], iy[i], iz[i]));
         r[i] = b.f_cos.x; g[i] = b.f_cos.y; b_[i] = b.f_cos.z; pdf[i] = b.pdf;"""  # fmt: skip
     r, g, b, pdf = call(
         "material", body, count, ("r", "g", "b_", "pdf"), features, **_components("o", wo, count),
@@ -63,7 +63,7 @@ def sample(
     """wi (3, N), weight (3, N), pdf (N,)."""
     u, v, lobe = uniforms(count, 3, seed)
     body = _SURFACE + """Uniform2 uv; uv.u = u[i]; uv.v = v[i];
-        BsdfSample b = sample_surface(&s, wo, uv, lobe[i]); x[i] = b.wi.x; y[i] = b.wi.y; z[i] = b.wi.z;
+        BsdfSample b = sample_bsdf(&s, wo, uv, lobe[i]); x[i] = b.wi.x; y[i] = b.wi.y; z[i] = b.wi.z;
         r[i] = b.weight.x; g[i] = b.weight.y; b_[i] = b.weight.z; pdf[i] = b.pdf;"""  # fmt: skip
     results = call(
         "material", body, count, ("x", "y", "z", "r", "g", "b_", "pdf"), features,

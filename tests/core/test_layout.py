@@ -47,12 +47,33 @@ def test_only_scalars_of_four_bytes() -> None:
 def test_constants_and_planes_are_in_the_header() -> None:
     header = layout.c_header()
     assert "#define NODE_LEAF 2147483648u" in header
-    assert "#define HIT_MATERIAL 12u" in header and "#define PATH_PLANES 11u" in header
+    assert "#define SURFACE_MATERIAL 12u" in header and "#define PATH_PLANES 11u" in header
+    assert "#define COUNTS_RAY_SHIFT 16u" in header and "#define COUNTS_RAY_MASK 255u" in header
     assert "#define CLASS_MEDIUM 8u" in header and "#define MIN_ALPHA 0.001f" in header
 
 
 @pytest.mark.parametrize(
-    "enum", [layout.RayPlane, layout.HitPlane, layout.PathPlane, layout.ShadowPlane, layout.LightPlane]
+    "enum",
+    [
+        layout.RayPlane,
+        layout.RawHitPlane,
+        layout.SurfacePlane,
+        layout.PathPlane,
+        layout.ShadowPlane,
+        layout.LightPlane,
+    ],
 )
 def test_planes_are_numbered_without_gaps(enum: type[IntEnum]) -> None:
     assert [int(plane) for plane in enum] == list(range(len(enum)))
+
+
+def test_numbers_that_share_a_word_do_not_overlap() -> None:
+    fields = {name: bits for name, bits in vars(layout).items() if isinstance(bits, layout.Bits)}
+    for word in {name.split("_")[0] for name in fields}:
+        masks = [bits.mask << bits.shift for name, bits in fields.items() if name.startswith(f"{word}_")]
+        assert sum(masks) < 1 << 32
+        assert sum(masks) == int(np.bitwise_or.reduce(np.array(masks, np.uint64)))
+    assert 1 << layout.PLACE_ON_TOP.shift == layout.NODE_PACK
+    assert layout.PLACE_LANE.mask == layout.BVH_WIDTH - 1
+    assert layout.COUNTS_RAY.mask >= layout.MOST_RAYS
+    assert layout.MEDIUM_LOW.mask == layout.MEDIUM_HIGH.mask == layout.MEDIUM_NONE

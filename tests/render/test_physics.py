@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +11,6 @@ from support.kernels import direction
 from support.renders import assert_same_mean, blocks, render, repeat
 
 from incpt.core.affine import Vector
-from incpt.device import program
 from incpt.device.device import Device
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
@@ -304,41 +302,6 @@ def test_russian_roulette_keeps_the_mean() -> None:
 # Light sampling, BSDF sampling, and both together
 
 
-def _only(technique: str, monkeypatch: pytest.MonkeyPatch) -> Device:
-    """A device whose kernels take one technique alone: the weights of both are replaced in the source."""
-    weights = {"light": ("1.0f", "(other > 0.0f ? 0.0f : 1.0f)"), "bsdf": ("0.0f", "1.0f")}[technique]
-    plain, places = program.source, {"light": 0, "bsdf": 0}
-
-    def patched(file: str, included: set[str] | None = None) -> str:
-        text = plain(file, included)
-        if included is not None:
-            return text
-        text, lights = re.subn(r"mis_weight\(light_pdf, ", "weight_of_light(", text)
-        text, bsdfs = re.subn(r"mis_weight\(MAX\(bsdf_pdf, 1e-30f\), ", "weight_of_bsdf(", text)
-        places["light"] += lights
-        places["bsdf"] += bsdfs
-        functions = "".join(
-            f"static inline float weight_of_{name}(float other) {{ return {value}; }}\n"
-            for name, value in zip(("light", "bsdf"), weights, strict=True)
-        )
-        return functions + text
-
-    monkeypatch.setattr(program, "source", patched)
-    device = Device()
-    for features in (
-        (),
-        ("TRIANGLE_LIGHTS",),
-        ("ENVIRONMENT_IMAGE",),
-        ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS"),
-    ):
-        for kernel in ("shade", "shade_medium", "shade_miss"):
-            device.kernel(kernel, features=features)
-    # shade and shade_medium weight a light and an emitter that is hit; shade_miss the environment, and it has
-    # the emitter's function in its source.
-    assert places == {"light": 4 * 2, "bsdf": 4 * 4}
-    return device
-
-
 def _plates(environment: Environment, *more: Object) -> Scene:
     lights = [
         _plane("small", "lamp", position=(-0.5, 1.5, -0.5), rotation=(150, 0, 0), scale=(0.4, 1, 0.4)),
@@ -368,10 +331,8 @@ def _sky() -> Environment:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["triangles", "environment", "both", "rough glass", "rough glass, direct"])
-@pytest.mark.parametrize("technique", ["light", "bsdf"])
-def test_each_technique_alone_gives_the_same(
-    case: str, technique: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("technique", ["MIS_ONLY_LIGHT", "MIS_ONLY_BSDF"])
+def test_each_technique_alone_gives_the_same(case: str, technique: str) -> None:
     scene = {
         "triangles": _plates(Environment()),
         "environment": _plates(_sky()).without_object("small").without_object("large"),
@@ -380,7 +341,7 @@ def test_each_technique_alone_gives_the_same(
     }[case.removesuffix(", direct")]
     arguments = {"max_bounces": 0 if "direct" in case else 3, "transmission_bounces": 4, "size": (32, 32)}
     both = repeat(scene, 64, **arguments)
-    alone = repeat(scene, 128, on=_only(technique, monkeypatch), **arguments)
+    alone = repeat(scene, 128, on=Device(features=(technique,)), **arguments)
     assert_same_mean(both, alone, relative=0.02)
     assert blocks(both, 8).var(axis=0).mean() > 0
 

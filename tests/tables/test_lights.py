@@ -25,8 +25,8 @@ from incpt.tables import environment, lights
 
 COUNT = 1 << 17
 Array = npt.NDArray[np.floating]
-_EMITTERS = """Params params = p[0]; Emitters e; e.lights = lights; e.image = image; e.marginal = marginal;
-    e.conditional = conditional; e.texel_pdf = texel_pdf; """
+_EMITTERS = """Params params = p[0]; Emitters e; e.lights = lights; e.environment_image = image;
+    e.marginal = marginal; e.conditional = conditional; e.texel_pdf = texel_pdf; """
 
 
 def _light_call(

@@ -1,0 +1,106 @@
+#include "accel/bvh.cl"
+#include "cpu/compaction.cl"
+#include "path/state.cl"
+
+// A block of paths: what one work-item takes from the camera to the ends of the paths. Its memory is an arena
+// of planes, which core/arena.py describes: what they mean, in which phase, and which of them share memory.
+
+// Functions of their own: the compiler is quicker with several small ones, and a profiler tells them apart.
+// PoCL keeps the variables of a kernel for each work-item of a group apart; those of a function that is
+// called lie in one place, and stay in the nearest cache.
+#define STAGE static __attribute__((noinline)) WIDE
+
+typedef struct {
+    const Params *params;
+    __global const Slot *slots;
+    Geometry geometry;
+    Shading shading;
+    Emitters emitters;
+    BruteForce brute_force;
+    State state;  // the paths between their rays
+    State traced; // the paths while their rays are traced: rays and paths lie in other planes
+    __local float *memory;
+} Block;
+
+// The planes of a region of the arena, and the same as unsigned integers.
+#define PLANES(memory, region) ((memory) + ARENA_##region * BLOCK_STRIDE)
+#define UINT_PLANES(memory, region) ((__local uint *)PLANES(memory, region))
+
+// The block of a kernel with BLOCK_PARAMETERS.
+#define BLOCK_OF(params, slots)                                                                              \
+    {params,                                                                                                 \
+     slots,                                                                                                  \
+     {GEOMETRY_ARGUMENTS},                                                                                   \
+     {SHADING_ARGUMENTS},                                                                                    \
+     {EMITTERS_ARGUMENTS},                                                                                   \
+     {BRUTE_FORCE_ARGUMENTS},                                                                                \
+     {PLANES(memory, RAYS), PLANES(memory, PATHS), PLANES(memory, SURFACES), PLANES(memory, SHADOWS),        \
+      PLANES(memory, RADIANCE)},                                                                             \
+     {PLANES(memory, TRACED_RAYS), PLANES(memory, TRACED_PATHS), 0, 0, PLANES(memory, RADIANCE)},            \
+     memory}
+
+// The place in the planes of radiance where a path gathers.
+INLINE uint load_result(const State *state, uint path) {
+    return load_bits(state->paths, PATH_RESULT * BLOCK_STRIDE + path);
+}
+INLINE void store_result(const State *state, uint path, uint result) {
+    store_bits(state->paths, PATH_RESULT * BLOCK_STRIDE + path, result);
+}
+
+INLINE RawHit load_raw_hit(const Block *block, uint path) {
+    __local const float *hits = PLANES(block->memory, RAW_HITS);
+    RawHit hit;
+    hit.distance = hits[RAW_HIT_DISTANCE * BLOCK_STRIDE + path];
+    hit.object = load_bits(hits, RAW_HIT_OBJECT * BLOCK_STRIDE + path);
+    hit.triangle = load_bits(hits, RAW_HIT_TRIANGLE * BLOCK_STRIDE + path);
+#pragma unroll
+    for (uint i = 0; i < 3; i++)
+        hit.weight[i] = hits[(RAW_HIT_WEIGHT_A + i) * BLOCK_STRIDE + path];
+    return hit;
+}
+
+INLINE void store_raw_hit(const Block *block, uint path, const RawHit *hit) {
+    __local float *hits = PLANES(block->memory, RAW_HITS);
+    hits[RAW_HIT_DISTANCE * BLOCK_STRIDE + path] = hit->distance;
+    store_bits(hits, RAW_HIT_OBJECT * BLOCK_STRIDE + path, hit->object);
+    store_bits(hits, RAW_HIT_TRIANGLE * BLOCK_STRIDE + path, hit->triangle);
+#pragma unroll
+    for (uint i = 0; i < 3; i++)
+        hits[(RAW_HIT_WEIGHT_A + i) * BLOCK_STRIDE + path] = hit->weight[i];
+}
+
+// How far traversal of trees looks for the hit of a path. Brute force has left its nearest hit before.
+INLINE float nearest_limit(const Block *block, uint path) {
+#ifdef BRUTE_FORCE
+    return PLANES(block->memory, RAW_HITS)[RAW_HIT_DISTANCE * BLOCK_STRIDE + path];
+#else
+    return INFINITY;
+#endif
+}
+
+// Rays are sorted into subsets by the largest component of their direction where brute force tests them,
+// because the axes of its tests follow from that. Elsewhere all rays are of one kind.
+#ifdef BRUTE_FORCE
+#define RAY_KINDS 3
+#else
+#define RAY_KINDS 1
+#endif
+
+// Which of `count` paths have a bit in their class, by the kinds of their `rays`; one subset for each kind.
+STAGE void subsets_by_kind(const Block *block, const State *state, __local const float *rays, uint wanted,
+                           uint count, Subset *kinds) {
+    __local uint *keys = UINT_PLANES(block->memory, KEYS);
+    LANES
+    for (int i = 0; i < (int)count; i++) {
+        uint meant = (load_class(state, i) & wanted) != 0u;
+#ifdef BRUTE_FORCE
+        uint kind = bvh_main_axis(load_ray(rays, BLOCK_STRIDE, i).direction);
+#else
+        uint kind = 0u;
+#endif
+        keys[i] = meant ? kind : NO_INDEX;
+    }
+    for (uint kind = 0; kind < RAY_KINDS; kind++)
+        kinds[kind] =
+            subset_where(keys, kind, count, UINT_PLANES(block->memory, SUBSETS) + kind * BLOCK_STRIDE);
+}

@@ -1,0 +1,249 @@
+"""The arguments of kernels, each written down once, in named groups.
+
+A group stands for the parameters of a kernel, the members of a C struct and what the host binds, all in the
+same order. The header has three things for the group GEOMETRY, say: `GEOMETRY_PARAMETERS` for the parameter
+list of a kernel, `GEOMETRY_ARGUMENTS` for their names, and the struct `Geometry`, so that a kernel reads
+
+    __kernel void intersect(FRAME_PARAMETERS, LIST_PARAMETERS, GEOMETRY_PARAMETERS, ...) {
+        const Geometry geometry = {GEOMETRY_ARGUMENTS};
+
+`KERNELS` names the groups of every kernel; `arguments` looks up what they are bound to by name. A test
+compares both with what the compiler says of each kernel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+
+class SceneBuffers(Protocol):
+    """What kernels need of a scene on a device."""
+
+    @property
+    def cluster_count(self) -> int:
+        """How many clusters brute force goes over."""
+
+    def buffer(self, name: str) -> Any:
+        """The buffer that is bound to the argument of that name."""
+
+
+@dataclass(frozen=True)
+class Argument:
+    """One argument: its name in C and Python, its type in C, and what it holds."""
+
+    name: str
+    c_type: str
+    holds: str
+
+    @property
+    def declaration(self) -> str:
+        """As a parameter or a member in C."""
+        return f"{self.c_type}{self.name}" if self.c_type.endswith("*") else f"{self.c_type} {self.name}"
+
+
+@dataclass(frozen=True)
+class Group:
+    """Arguments that go together, in order. `struct`: the C struct that takes them; None: there is none."""
+
+    name: str
+    struct: str | None
+    arguments: tuple[Argument, ...]
+
+
+def _table(name: str, c_type: str, holds: str) -> Argument:
+    return Argument(name, f"__global const {c_type} *", holds)
+
+
+def _planes(name: str, holds: str) -> Argument:
+    return Argument(name, "__global float *", holds)
+
+
+def _count(name: str, holds: str) -> Argument:
+    return Argument(name, "uint", holds)
+
+
+FRAME = Group("FRAME", None, (Argument("params", "Params", "the settings of this launch"),))
+
+SLOTS = Group("SLOTS", None, (_table("slots", "Slot", "which tile and which samples are in which slot"),))
+
+LIST = Group(
+    "LIST",
+    None,
+    (
+        _count("count", "places of `list`; work-items beyond have nothing to do"),
+        _table("list", "uint", "places of the paths that the kernel works on"),
+    ),
+)
+
+GEOMETRY = Group(
+    "GEOMETRY",
+    "Geometry",
+    (
+        _table("top_nodes", "Node", "the tree over objects and over the packs of small meshes"),
+        _table("top_packs", "TrianglePack", "triangles of small meshes, in world space"),
+        _table("nodes", "Node", "the trees of the other meshes, one after the other"),
+        _table("packs", "TrianglePack", "their triangles, in object space"),
+        _table("objects", "Object", "placement and mesh of every object"),
+        _table("normals", "float", "normals at the corners of faces, mesh by mesh"),
+    ),
+)
+
+SHADING = Group(
+    "SHADING",
+    "Shading",
+    (
+        _table("materials", "Material", "every material"),
+        _table("layers", "float", "of every material the albedo table of its layer, see shading/material.cl"),
+    ),
+)
+
+EMITTERS = Group(
+    "EMITTERS",
+    "Emitters",
+    (
+        _table("lights", "float", "LightPlane of params.light_count emissive triangles"),
+        _table("environment_image", "float", "red, green and blue, row by row from +y"),
+        _table("marginal", "float", "cumulative distribution of its rows, height + 1"),
+        _table("conditional", "float", "of the pixels of each row, width + 1 each"),
+        _table("texel_pdf", "float", "density over the unit square of the image, per texel"),
+    ),
+)
+
+BRUTE_FORCE = Group(
+    "BRUTE_FORCE",
+    "BruteForce",
+    (
+        _table("quads", "Quad", "parallelograms and triangles, in world space"),
+        _table("parallelepipeds", "Parallelepiped", "in world space"),
+        _table("clusters", "Cluster", "what of them stands together"),
+        _count("cluster_count", "at most 32; rays meet the last without asking for its box"),
+    ),
+)
+
+PATH_STATE = Group(
+    "PATH_STATE",
+    None,
+    (
+        _planes("rays", "RayPlane"),
+        _planes("paths", "PathPlane"),
+        _planes("surfaces", "SurfacePlane"),
+        _planes("shadows", "ShadowPlane"),
+        _planes("radiance", "what each path of the step has gathered: red, green and blue"),
+    ),
+)
+
+COMPACTION = Group(
+    "COMPACTION",
+    None,
+    (
+        _count("takes_all", "1: the paths 0 .. count - 1 are looked at, and not those of `list`"),
+        _count("class_0", "the PathClass that paths of the first new list have"),
+        Argument("list_0", "__global uint *", "the first new list"),
+        _count("class_1", "as class_0, of the second list"),
+        Argument("list_1", "__global uint *", "the second new list"),
+        _count("class_2", "as class_0, of the third list"),
+        Argument("list_2", "__global uint *", "the third new list"),
+        Argument("counters", "__global uint *", "the lengths of the three lists, which grow"),
+    ),
+)
+
+BLOCK_MEMORY = Group(
+    "BLOCK_MEMORY", None, (Argument("memory", "__local float *", "the arena of a block, see arena.py"),)
+)
+
+RADIANCE = Group(
+    "RADIANCE",
+    None,
+    (Argument("path_buffer", "__global float *", "what each path of the step has gathered, three planes"),),
+)
+
+FIRST_HITS = Group(
+    "FIRST_HITS",
+    None,
+    (
+        _count("pixels", "of the picture: the stride of `first_surface`"),
+        Argument("first_surface", "__global float *", "seven planes, see film/first_hits.cl"),
+        Argument("object_ids", "__global uint *", "the object that each pixel shows, NO_INDEX for none"),
+    ),
+)
+
+GROUPS = (
+    FRAME, SLOTS, LIST, GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE, PATH_STATE, COMPACTION, BLOCK_MEMORY,
+    RADIANCE, FIRST_HITS,
+)  # fmt: skip
+"""Every group."""
+
+BLOCK = (GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE, BLOCK_MEMORY)
+"""What kernels over blocks of paths need of a scene, and the memory of a block: BLOCK_PARAMETERS in C."""
+
+KERNELS: dict[str, tuple[Group, ...]] = {
+    "generate": (FRAME, SLOTS, PATH_STATE),
+    "compact": (FRAME, LIST, PATH_STATE, COMPACTION),
+    "intersect": (FRAME, LIST, GEOMETRY, SHADING, PATH_STATE),
+    "sample_lights": (FRAME, LIST, EMITTERS, PATH_STATE),
+    "shade": (FRAME, LIST, SHADING, PATH_STATE),
+    "shade_medium": (FRAME, LIST, SHADING, PATH_STATE),
+    "shade_miss": (FRAME, LIST, SHADING, EMITTERS, PATH_STATE),
+    "trace_shadow": (FRAME, LIST, GEOMETRY, PATH_STATE),
+    "trace_blocks": (FRAME, SLOTS, *BLOCK, RADIANCE),
+    "first_hits": (FRAME, SHADING, PATH_STATE, FIRST_HITS),
+}
+"""The groups that each kernel takes, in order."""
+
+_OF_SCENE = {
+    argument.name for group in (GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE) for argument in group.arguments
+}
+
+
+def parameters(groups: tuple[Group, ...]) -> list[Argument]:
+    """All arguments of these groups, in order."""
+    return [argument for group in groups for argument in group.arguments]
+
+
+def arguments(
+    groups: tuple[Group, ...], values: Mapping[str, Any], scene: SceneBuffers | None = None
+) -> list[Any]:
+    """What a kernel with these groups is launched with: by name from `values`, else from the scene.
+
+    Whole numbers become what the kernel takes. Raises KeyError where nothing has the name.
+    """
+    return [_bound(argument, values, scene) for argument in parameters(groups)]
+
+
+def _bound(argument: Argument, values: Mapping[str, Any], scene: SceneBuffers | None) -> Any:
+    if argument.name in values:
+        value = values[argument.name]
+    elif scene is not None and argument.name in _OF_SCENE:
+        value = scene.cluster_count if argument.name == "cluster_count" else scene.buffer(argument.name)
+    else:
+        raise KeyError(f"nothing is bound to the kernel argument {argument.name!r}: {argument.holds}")
+    return np.uint32(value) if argument.c_type == "uint" else value
+
+
+def c_header(groups: tuple[Group, ...] = GROUPS) -> str:
+    """OpenCL C text of these groups, and of BLOCK_PARAMETERS."""
+    block = _c_macro("BLOCK_PARAMETERS", ", ".join(f"{group.name}_PARAMETERS" for group in BLOCK))
+    return "".join(map(_c_group, groups)) + (block if set(BLOCK) <= set(groups) else "")
+
+
+def _c_group(group: Group) -> str:
+    lines = [
+        _c_macro(f"{group.name}_PARAMETERS", ", ".join(_c_parameter(a) for a in group.arguments)),
+        _c_macro(f"{group.name}_ARGUMENTS", ", ".join(argument.name for argument in group.arguments)),
+    ]
+    if group.struct is not None:
+        members = "".join(f"    {a.declaration}; // {a.holds}\n" for a in group.arguments)
+        lines.append(f"typedef struct {{\n{members}}} {group.struct};\n")
+    return "".join(lines)
+
+
+def _c_parameter(argument: Argument) -> str:
+    return argument.declaration if argument.c_type.endswith("*") else f"const {argument.declaration}"
+
+
+def _c_macro(name: str, text: str) -> str:
+    return f"#define {name} {text}\n"

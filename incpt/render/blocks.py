@@ -1,0 +1,56 @@
+"""The path tracer as one kernel over blocks of paths (cl/cpu/trace_blocks.cl), for CPUs under clang."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from incpt.core import arena, bindings
+from incpt.device.device import Device
+from incpt.tables.scene_tables import SceneTables
+
+
+def traces_in_blocks(device: Device) -> bool:
+    """Whether paths are traced in blocks, by one kernel that is made for compilers and caches of CPUs."""
+    return device.block_paths is not None
+
+
+def trace(
+    device: Device,
+    scene: SceneTables,
+    params: npt.NDArray[np.void],
+    slots: cl.Buffer,
+    path_count: int,
+    radiance: cl.Buffer,
+) -> None:
+    """Trace `path_count` paths, those of `slots` in order; `radiance` gets what each brings, as three planes
+    of params["buffer_stride"] floats. No path at all builds the kernel."""
+    whole = params.copy()
+    whole["path_count"] = path_count
+    kernel = device.kernel("trace_blocks", features=scene.variant)
+    values = {"params": whole, "slots": slots, "path_buffer": radiance}
+    launch(device, kernel, bindings.KERNELS["trace_blocks"], path_count, values, scene)
+
+
+def launch(
+    device: Device,
+    kernel: cl.Kernel,
+    groups: tuple[bindings.Group, ...],
+    path_count: int,
+    values: Mapping[str, Any],
+    scene: SceneTables,
+) -> None:
+    """Launch a kernel over the blocks of so many paths, one at least; `groups` are what it takes, among them
+    bindings.BLOCK. Rays go through the trees of what is not tested by brute force."""
+    paths = device.block_paths
+    assert paths is not None, f"{device.name} traces no blocks"
+    own = {
+        "top_nodes": scene.buffer("block_nodes"),
+        "memory": cl.LocalMemory(arena.byte_count(paths)),
+    }
+    arguments = bindings.arguments(groups, {**own, **values}, scene)
+    device.launch(kernel, max(-(-path_count // paths), 1), *arguments, work_group=1)
