@@ -233,16 +233,14 @@ INLINE void trace_block(const Block *block, uint first, uint count) {
         count = trace_rays(block, count, ray == 0);
         RayEnds ends;
         classify_hits(block, count, &ends);
-        const float *sky = block->params->environment_color;
-        if (sky[0] + sky[1] + sky[2] > 0.0f)
+        if (block->params->sees_sky)
             shade_misses(block, &ends.misses);
         count = compact_hits(block, &ends);
         setup_surfaces(block, count);
 #ifdef MEDIA
         shade_media(block, ends.surfaces.count, count);
 #else
-        // Every ray is a scattering event, so that all paths end with the same one.
-        if (ray > block->params->max_bounces) {
+        if (ray == block->params->last_ray) {
             finish_paths(block, count);
             return;
         }

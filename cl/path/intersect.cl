@@ -5,7 +5,7 @@
 // making SIMD lanes of work-items, as Intel's would: the lanes are boxes and triangles.
 __kernel __attribute__((vec_type_hint(float8))) void
 intersect(FRAME_PARAMETERS, LIST_PARAMETERS, GEOMETRY_PARAMETERS, SHADING_PARAMETERS, PATH_STATE_PARAMETERS) {
-    if (get_global_id(0) >= count)
+    if (get_global_id(0) >= lengths[length_place])
         return;
     const uint path = list[get_global_id(0)];
     const State state = STATE_OF(params);

@@ -104,7 +104,7 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
     Vec3 carried = mul(throughput, next.weight);
     float survival = survival_probability(carried, p.bounces, params->roulette_depth);
     int goes_on = possible & (bounces <= params->max_bounces + 1u) &
-                  (passages <= params->transmission_bounces) & (p.ray < MOST_RAYS - 1u) &
+                  (passages <= params->transmission_bounces) & (p.ray < MOST_RAYS_IN_MEDIA) &
                   (largest(carried) > 0.0f) & (luck.u < survival);
     carried = scale(1.0f / survival, carried);
 
@@ -141,11 +141,11 @@ INLINE void absorb_light(const Shading *shading, const State *state, uint path) 
 
 #ifndef BLOCKS
 __kernel void shade_medium(FRAME_PARAMETERS, LIST_PARAMETERS, SHADING_PARAMETERS, PATH_STATE_PARAMETERS) {
-    if (get_global_id(0) >= count)
+    if (get_global_id(0) >= lengths[length_place])
         return;
     const State state = STATE_OF(params);
     const Shading shading = {SHADING_ARGUMENTS};
-    const WorkItem item = listed_path(&params, count, list);
+    const WorkItem item = listed_path(&params, lengths[length_place], list);
     shade_medium_path(&params, &shading, &state, item.path, item.result);
 #ifdef LIGHT_SAMPLING
     if (load_class(&state, item.path) == CLASS_SURFACE)

@@ -22,10 +22,11 @@ INLINE void shade_miss_path(const Params *params, const Shading *shading, const 
 #ifndef BLOCKS
 __kernel void shade_miss(FRAME_PARAMETERS, LIST_PARAMETERS, SHADING_PARAMETERS, EMITTERS_PARAMETERS,
                          PATH_STATE_PARAMETERS) {
+    RETURN_IF_GROUP_IS_IDLE(lengths[length_place])
     const State state = STATE_OF(params);
     const Shading shading = {SHADING_ARGUMENTS};
     const Emitters emitters = {EMITTERS_ARGUMENTS};
-    const WorkItem item = listed_path(&params, count, list);
+    const WorkItem item = listed_path(&params, lengths[length_place], list);
     shade_miss_path(&params, &shading, &emitters, &state, item.path, item.result);
 }
 #endif

@@ -217,6 +217,12 @@ INLINE void store_shadow_ray(const State *state, uint path, Vec3 origin, Vec3 ra
 }
 
 #ifndef BLOCKS
+// Ends the work-groups of a wavefront that lie beyond the list as a whole. This branch is the same for all
+// work-items of a group, so that their loop is vectorised nevertheless.
+#define RETURN_IF_GROUP_IS_IDLE(count)                                                                       \
+    if (get_group_id(0) * get_local_size(0) >= (count))                                                      \
+        return;
+
 // The path that a work-item of a wavefront has, and the place in the planes of radiance where it gathers.
 // Work-items beyond the list work on scratch paths in the last places: a branch would end vectorisation.
 typedef struct {

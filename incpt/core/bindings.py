@@ -74,7 +74,8 @@ LIST = Group(
     "LIST",
     None,
     (
-        _count("count", "places of `list`; work-items beyond have nothing to do"),
+        Argument("lengths", "__global uint *", "lengths of all lists"),
+        _count("length_place", "where that of `list` stands; work-items beyond it have nothing to do"),
         _table("list", "uint", "places of the paths that the kernel works on"),
     ),
 )
@@ -140,14 +141,16 @@ COMPACTION = Group(
     "COMPACTION",
     None,
     (
-        _count("takes_all", "1: the paths 0 .. count - 1 are looked at, and not those of `list`"),
+        _count("takes_all", "1: all paths of the chunk are looked at, and not those of `list`"),
         _count("class_0", "the PathClass that paths of the first new list have"),
         Argument("list_0", "__global uint *", "the first new list"),
+        _count("length_0", "where its length stands, which grows"),
         _count("class_1", "as class_0, of the second list"),
         Argument("list_1", "__global uint *", "the second new list"),
+        _count("length_1", "where its length stands"),
         _count("class_2", "as class_0, of the third list"),
         Argument("list_2", "__global uint *", "the third new list"),
-        Argument("counters", "__global uint *", "the lengths of the three lists, which grow"),
+        _count("length_2", "where its length stands"),
     ),
 )
 

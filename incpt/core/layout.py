@@ -44,8 +44,10 @@ WORK_GROUP_SIZE = 64
 COMPACT_BLOCK = 64
 """Paths that one work-item of `compact` looks at: few atomics, and enough work-items for a GPU."""
 
-MOST_RAYS = 251
-"""Rays of a path at most: what COUNTS_RAY can hold, with room to spare."""
+MOST_RAYS = 256
+"""Rays of a path at most: their numbers are what COUNTS_RAY can hold."""
+MOST_RAYS_IN_MEDIA = 250
+"""Rays after which no path goes on from a transparent body. Those left are for the opaque surfaces behind."""
 
 MIN_ALPHA = 1e-3
 """Least GGX alpha: below it GGX is a mirror to float precision. A dielectric is smooth there, an opaque
@@ -195,6 +197,20 @@ class PathClass(IntFlag):
     SURFACE = 4
     MEDIUM = 8
     MISS = 16
+
+
+class PathList(IntEnum):
+    """Lists of paths that the stages of a wavefront go over; each has a length for every ray.
+
+    The live paths; those on opaque surfaces; those whose ray met nothing; those at or in transparent bodies;
+    those that ask for a shadow ray.
+    """
+
+    LIVE = 0
+    SURFACE = 1
+    MISS = 2
+    MEDIUM = 3
+    SHADOW = 4
 
 
 class SlotFlag(IntFlag):
@@ -398,6 +414,8 @@ PARAMS = _packed(
         ("environment_width", np.uint32),
         ("environment_height", np.uint32),
         ("environment_rotation", np.float32),  # as a fraction of a full turn
+        ("last_ray", np.uint32),  # number of the ray with which all paths end, see schedule.py
+        ("sees_sky", np.uint32),  # 1: light comes from far away
         ("pixel_center", np.uint32),  # 1: camera rays go through pixel centres (picking, AOVs)
     ]
 )

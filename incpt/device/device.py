@@ -166,6 +166,13 @@ class Device:
         except cl.Error as error:
             raise DeviceError(_explain(error, "a copy")) from error
 
+    def read_later(self, buffer: cl.Buffer, array: npt.NDArray[Any], offset: int = 0) -> cl.Event:
+        """Fill `array` from `buffer` like `read`, but return at once. It is filled when the event is done."""
+        try:
+            return cl.enqueue_copy(self.queue, array, buffer, src_offset=offset, is_blocking=False)
+        except cl.Error as error:
+            raise DeviceError(_explain(error, "a read")) from error
+
     def fill(self, buffer: cl.Buffer, value: int, nbytes: int, offset: int = 0) -> None:
         """Set `nbytes` of `buffer` to the 32-bit pattern `value`."""
         try:

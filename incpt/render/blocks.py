@@ -11,6 +11,7 @@ import pyopencl as cl
 
 from incpt.core import arena, bindings
 from incpt.device.device import Device
+from incpt.render.schedule import scheduled
 from incpt.tables.scene_tables import SceneTables
 
 
@@ -29,7 +30,7 @@ def trace(
 ) -> None:
     """Trace `path_count` paths, those of `slots` in order; `radiance` gets what each brings, as three planes
     of params["buffer_stride"] floats. No path at all builds the kernel."""
-    whole = params.copy()
+    whole = scheduled(params, scene)
     whole["path_count"] = path_count
     kernel = device.kernel("trace_blocks", features=scene.variant)
     values = {"params": whole, "slots": slots, "path_buffer": radiance}

@@ -5,11 +5,17 @@ of the paths that need it: a terminated path costs nothing more, and on PoCL the
 in SIMD lanes. Paths are traced in chunks whose state fits the caches of a CPU.
 
     generate -> [ intersect -> shade_miss, sample_lights, shade_medium, shade -> trace_shadow ] once a ray
+
+The lengths of the lists stay on the device. The host launches each stage over a bound of its list, and learns
+how many paths are left of a ray while the device is at work on a later one; work-items beyond the list have
+nothing to do.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -18,19 +24,44 @@ import numpy.typing as npt
 import pyopencl as cl
 
 from incpt.core import bindings, layout
+from incpt.core.layout import PathClass, PathList
 from incpt.device.device import BUILD_SIZES, Device
 from incpt.render import blocks
+from incpt.render.schedule import scheduled
 from incpt.tables.scene_tables import SceneTables
 
-_MOST_LISTS = 3
+_RAYS_AHEAD = 2
+"""Rays whose stages are enqueued before the host needs to know how many paths the first of them has left."""
 
-_Class = layout.PathClass
 _PLANES = {
     "rays": layout.RayPlane,
     "paths": layout.PathPlane,
     "surfaces": layout.SurfacePlane,
     "shadows": layout.ShadowPlane,
 }
+_CLASSES = {
+    PathList.LIVE: PathClass.LIVE,
+    PathList.SURFACE: PathClass.SURFACE,
+    PathList.MISS: PathClass.MISS,
+    PathList.MEDIUM: PathClass.MEDIUM,
+    PathList.SHADOW: PathClass.SHADOW,
+}
+"""Which paths are in which list."""
+_NEW_LISTS = 3
+"""Lists that `compact` appends to at a time."""
+
+
+@dataclass(frozen=True)
+class _Chunk:
+    """Paths that are traced together: in which scene, by which settings, and where they gather."""
+
+    scene: SceneTables
+    params: npt.NDArray[np.void]
+    radiance: cl.Buffer
+
+    @property
+    def size(self) -> int:
+        return int(self.params["path_count"])
 
 
 class Wavefront:
@@ -45,10 +76,12 @@ class Wavefront:
         self._planes = {name: device.empty(4 * len(planes) * self.stride) for name, planes in _PLANES.items()}
         for buffer in self._planes.values():
             device.fill(buffer, 0, buffer.size)
-        self._live, self._next, self._surfaces, self._media, self._misses, self._shadowed = (
-            device.empty(4 * self.stride) for _ in range(6)
-        )
-        self._counters = device.empty(4 * _MOST_LISTS)
+        # The live paths of the next ray are listed while those of this one are still needed.
+        self._live = tuple(device.empty(4 * self.stride) for _ in range(2))
+        self._lists = {
+            path_list: device.empty(4 * self.stride) for path_list in PathList if path_list != PathList.LIVE
+        }
+        self._lengths = device.empty(4 * len(PathList) * (layout.MOST_RAYS + 1))
         self._least_size = 1
 
     def trace(
@@ -64,13 +97,8 @@ class Wavefront:
         if self.in_blocks:
             blocks.trace(self.device, scene, params, slots, path_count, radiance)
             return
-        for first in range(0, path_count, self.chunk_paths):
-            chunk = self._chunk_params(params, first, path_count)
-            count = self._generate(chunk, slots, radiance)
-            for ray in range(layout.MOST_RAYS):
-                if count == 0:
-                    break
-                count = self._bounce(scene, chunk, ray, count, radiance)
+        for chunk in self._chunks(scene, params, path_count, radiance):
+            self._trace_chunk(chunk, slots)
 
     def first_hits(
         self,
@@ -83,35 +111,34 @@ class Wavefront:
         radiance: cl.Buffer,
     ) -> None:
         """What camera rays meet: `surface` and `object_ids` as cl/film/first_hits.cl fills them."""
-        for first in range(0, path_count, self.chunk_paths):
-            chunk = self._chunk_params(params, first, path_count)
-            count = self._generate(chunk, slots, radiance)
-            self._intersect(scene, chunk, count, radiance)
-            self._first_hits(scene, chunk, surface, object_ids, radiance)
+        for chunk in self._chunks(scene, params, path_count, radiance):
+            self._generate(chunk, slots)
+            self._intersect(chunk, 0, chunk.size)
+            self._first_hits(chunk, surface, object_ids)
 
     def idle_launches(
         self, scene: SceneTables, params: npt.NDArray[np.void], slots: cl.Buffer, radiance: cl.Buffer
     ) -> list[Callable[[], None]]:
         """A launch of every kernel that `trace` and `first_hits` may need for this scene, each with nothing
         to do; see `Device.built`. `slots` holds one slot, which lanes without a path read."""
-        chunk = self._chunk_params(params, 0, 0)
-        nothing = self._counters
+        chunk = self._chunk(scene, params, 0, 0, radiance)
+        nothing = self._lengths
         stages: list[Callable[[], object]] = [
-            partial(self._generate, chunk, slots, radiance),
-            partial(self._intersect, scene, chunk, 0, radiance),
-            partial(self._first_hits, scene, chunk, nothing, nothing, radiance),
+            partial(self._generate, chunk, slots),
+            partial(self._intersect, chunk, 0, 0),
+            partial(self._first_hits, chunk, nothing, nothing),
         ]
         if not self.in_blocks:
             stages += [
-                partial(self._sample_lights, scene, chunk, 0, self._surfaces, radiance),
-                partial(self._shade, scene, chunk, 0, radiance),
-                partial(self._trace_shadows, scene, chunk, 0, radiance),
-                partial(self._shade_misses, scene, chunk, 0, radiance),
+                partial(self._sample_lights, chunk, 0, 0, PathList.SURFACE),
+                partial(self._shade, chunk, 0, 0),
+                partial(self._trace_shadows, chunk, 0, 0),
+                partial(self._shade_misses, chunk, 0, 0),
             ]
             if scene.has_media:
-                stages.append(partial(self._shade_media, scene, chunk, 0, radiance))
+                stages.append(partial(self._shade_media, chunk, 0, 0))
             else:
-                stages.append(partial(self._shade, scene, chunk, 0, radiance, last=True))
+                stages.append(partial(self._shade, chunk, 0, 0, last=True))
         launches: list[Callable[[], None]] = [
             partial(self._launch_idle, stage, size) for stage in stages for size in BUILD_SIZES
         ]
@@ -121,157 +148,143 @@ class Wavefront:
 
     def _launch_idle(self, stage: Callable[[], object], size: int) -> None:
         self._least_size = size
+        self.device.fill(self._lengths, 0, self._lengths.size)
         try:
             stage()
         finally:
             self._least_size = 1
 
-    def _generate(self, params: npt.NDArray[np.void], slots: cl.Buffer, radiance: cl.Buffer) -> int:
-        """Start the paths of a chunk; returns how many lie in the image."""
-        size = int(params["path_count"])
-        self._launch("generate", size, radiance, params=params, slots=slots)
-        return self._compact(params, size, None, radiance, (_Class.LIVE, self._live))[0]
+    def _chunks(
+        self, scene: SceneTables, params: npt.NDArray[np.void], path_count: int, radiance: cl.Buffer
+    ) -> list[_Chunk]:
+        return [
+            self._chunk(scene, params, first, min(self.chunk_paths, path_count - first), radiance)
+            for first in range(0, path_count, self.chunk_paths)
+        ]
 
-    def _chunk_params(
-        self, params: npt.NDArray[np.void], first: int, path_count: int
-    ) -> npt.NDArray[np.void]:
-        chunk = params.copy()
-        chunk["first_path"] = first
-        chunk["path_count"] = min(self.chunk_paths, path_count - first)
-        chunk["path_stride"] = self.stride
-        return chunk
+    def _chunk(
+        self, scene: SceneTables, params: npt.NDArray[np.void], first: int, size: int, radiance: cl.Buffer
+    ) -> _Chunk:
+        own = scheduled(params, scene)
+        own["first_path"], own["path_count"], own["path_stride"] = first, size, self.stride
+        return _Chunk(scene, own, radiance)
 
-    def _bounce(
-        self, scene: SceneTables, params: npt.NDArray[np.void], ray: int, count: int, radiance: cl.Buffer
-    ) -> int:
-        """Ray number `ray` of every live path; returns how many paths go on."""
-        self._intersect(scene, params, count, radiance)
-        surface_count, miss_count, medium_count = self._compact(
-            params,
-            count,
-            self._live,
-            radiance,
-            (_Class.SURFACE, self._surfaces),
-            (_Class.MISS, self._misses),
-            (_Class.MEDIUM, self._media),
-        )
-        if miss_count and any(scene.environment_radiance):
-            self._shade_misses(scene, params, miss_count, radiance)
-        # Without media every ray is a scattering event, so that all paths end with the same one.
-        last = not scene.has_media and ray > int(params["max_bounces"])
-        if surface_count and not last:
-            self._sample_lights(scene, params, surface_count, self._surfaces, radiance)
-        if medium_count:
-            self._sample_lights(scene, params, medium_count, self._media, radiance)
-            surface_count = self._shade_media(scene, params, medium_count, radiance)
-        if surface_count:
-            self._shade(scene, params, surface_count, radiance, last)
-        next_count, shadow_count, _ = self._compact(
-            params, count, self._live, radiance, (_Class.LIVE, self._next), (_Class.SHADOW, self._shadowed)
-        )
-        if shadow_count:
-            self._trace_shadows(scene, params, shadow_count, radiance)
-        self._live, self._next = self._next, self._live
-        return next_count
+    def _trace_chunk(self, chunk: _Chunk, slots: cl.Buffer) -> None:
+        self._generate(chunk, slots)
+        bound = chunk.size
+        left: deque[tuple[cl.Event, npt.NDArray[np.uint32]]] = deque()
+        for ray in range(int(chunk.params["last_ray"]) + 1):
+            if len(left) == _RAYS_AHEAD:
+                done, length = left.popleft()
+                done.wait()
+                bound = int(length[0])
+                if bound == 0:
+                    break
+            self._trace_ray(chunk, ray, bound)
+            length = np.empty(1, np.uint32)
+            offset = 4 * _length_place(PathList.LIVE, ray + 1)
+            left.append((self.device.read_later(self._lengths, length, offset), length))
 
-    def _intersect(
-        self, scene: SceneTables, params: npt.NDArray[np.void], count: int, radiance: cl.Buffer
-    ) -> None:
-        self._launch("intersect", count, radiance, scene, params=params, list=self._live)
+    def _trace_ray(self, chunk: _Chunk, ray: int, bound: int) -> None:
+        """Ray number `ray` of every live path, which are `bound` at most."""
+        last = ray == int(chunk.params["last_ray"])
+        self._intersect(chunk, ray, bound)
+        listed = [(path_list, ray) for path_list in (PathList.SURFACE, PathList.MISS, PathList.MEDIUM)]
+        self._compact(chunk, ray, bound, PathList.LIVE, *listed)
+        if chunk.params["sees_sky"]:
+            self._shade_misses(chunk, ray, bound)
+        if not last:
+            self._sample_lights(chunk, ray, bound, PathList.SURFACE)
+        if chunk.scene.has_media:
+            self._sample_lights(chunk, ray, bound, PathList.MEDIUM)
+            self._shade_media(chunk, ray, bound)
+        self._shade(chunk, ray, bound, last)
+        if not last:
+            self._compact(chunk, ray, bound, PathList.LIVE, (PathList.SHADOW, ray), (PathList.LIVE, ray + 1))
+            self._trace_shadows(chunk, ray, bound)
 
-    def _shade_misses(
-        self, scene: SceneTables, params: npt.NDArray[np.void], count: int, radiance: cl.Buffer
-    ) -> None:
-        features = (*scene.features, *(("MEDIA",) if scene.has_media else ()))
-        self._launch("shade_miss", count, radiance, scene, features, params=params, list=self._misses)
+    def _generate(self, chunk: _Chunk, slots: cl.Buffer) -> None:
+        """Start the paths of a chunk, and list those that lie in the image."""
+        self._launch("generate", chunk, chunk.size, slots=slots)
+        self.device.fill(self._lengths, 0, self._lengths.size)
+        self._compact(chunk, 0, chunk.size, None, (PathList.LIVE, 0))
 
-    def _shade(
-        self,
-        scene: SceneTables,
-        params: npt.NDArray[np.void],
-        count: int,
-        radiance: cl.Buffer,
-        last: bool = False,
-    ) -> None:
-        features = ("EMISSION_ONLY",) if last else scene.features
-        self._launch("shade", count, radiance, scene, features, params=params, list=self._surfaces)
+    def _intersect(self, chunk: _Chunk, ray: int, bound: int) -> None:
+        self._launch_listed("intersect", chunk, ray, bound, PathList.LIVE)
 
-    def _trace_shadows(
-        self, scene: SceneTables, params: npt.NDArray[np.void], count: int, radiance: cl.Buffer
-    ) -> None:
-        self._launch("trace_shadow", count, radiance, scene, params=params, list=self._shadowed)
+    def _shade_misses(self, chunk: _Chunk, ray: int, bound: int) -> None:
+        features = (*chunk.scene.features, *(("MEDIA",) if chunk.scene.has_media else ()))
+        self._launch_listed("shade_miss", chunk, ray, bound, PathList.MISS, features)
 
-    def _first_hits(
-        self,
-        scene: SceneTables,
-        params: npt.NDArray[np.void],
-        surface: cl.Buffer,
-        object_ids: cl.Buffer,
-        radiance: cl.Buffer,
-    ) -> None:
-        pixels = int(params["width"]) * int(params["height"])
-        self._launch(
-            "first_hits", int(params["path_count"]), radiance, scene,
-            params=params, pixels=pixels, first_surface=surface, object_ids=object_ids,
-        )  # fmt: skip
+    def _shade(self, chunk: _Chunk, ray: int, bound: int, last: bool = False) -> None:
+        features = ("EMISSION_ONLY",) if last else chunk.scene.features
+        self._launch_listed("shade", chunk, ray, bound, PathList.SURFACE, features)
 
-    def _sample_lights(
-        self,
-        scene: SceneTables,
-        params: npt.NDArray[np.void],
-        count: int,
-        paths: cl.Buffer,
-        radiance: cl.Buffer,
-    ) -> None:
-        if scene.features:
-            self._launch("sample_lights", count, radiance, scene, scene.features, params=params, list=paths)
+    def _trace_shadows(self, chunk: _Chunk, ray: int, bound: int) -> None:
+        if chunk.scene.features:
+            self._launch_listed("trace_shadow", chunk, ray, bound, PathList.SHADOW)
 
-    def _shade_media(
-        self, scene: SceneTables, params: npt.NDArray[np.void], count: int, radiance: cl.Buffer
-    ) -> int:
+    def _sample_lights(self, chunk: _Chunk, ray: int, bound: int, paths: PathList) -> None:
+        if chunk.scene.features:
+            self._launch_listed("sample_lights", chunk, ray, bound, paths, chunk.scene.features)
+
+    def _shade_media(self, chunk: _Chunk, ray: int, bound: int) -> None:
         """Shade the paths at or in transparent bodies. Those that stand on an opaque surface in there join
-        the others; returns how many they are then."""
-        self._launch("shade_medium", count, radiance, scene, scene.features, params=params, list=self._media)
-        return self._compact(
-            params, count, self._media, radiance, (_Class.SURFACE, self._surfaces), append=True
-        )[0]
+        the others."""
+        self._launch_listed("shade_medium", chunk, ray, bound, PathList.MEDIUM, chunk.scene.features)
+        self._compact(chunk, ray, bound, PathList.MEDIUM, (PathList.SURFACE, ray))
+
+    def _first_hits(self, chunk: _Chunk, surface: cl.Buffer, object_ids: cl.Buffer) -> None:
+        pixels = int(chunk.params["width"]) * int(chunk.params["height"])
+        self._launch(
+            "first_hits", chunk, chunk.size, pixels=pixels, first_surface=surface, object_ids=object_ids
+        )
 
     def _compact(
-        self,
-        params: npt.NDArray[np.void],
-        count: int,
-        source: cl.Buffer | None,
-        radiance: cl.Buffer,
-        *lists: tuple[_Class, cl.Buffer],
-        append: bool = False,
-    ) -> tuple[int, int, int]:
-        """Sort paths of `source` (None: all) into up to three lists by class; returns the lists' lengths.
-        `append` goes on with the lists of the last call."""
-        if not append:
-            self.device.fill(self._counters, 0, 4 * _MOST_LISTS)
-        unused = (_Class(0), self._misses)
-        values: dict[str, Any] = {"takes_all": source is None, "list": source or self._live, "count": count}
-        for i, (bits, target) in enumerate((*lists, unused, unused)[:_MOST_LISTS]):
-            values |= {f"class_{i}": bits, f"list_{i}": target}
-        self._launch(
-            "compact", -(-count // layout.COMPACT_BLOCK), radiance,
-            params=params, counters=self._counters, **values,
-        )  # fmt: skip
-        first, second, third = self.device.read(self._counters, np.empty(_MOST_LISTS, np.uint32)).tolist()
-        return first, second, third
+        self, chunk: _Chunk, ray: int, bound: int, source: PathList | None, *targets: tuple[PathList, int]
+    ) -> None:
+        """Append the paths of `source` (None: all) to up to three lists, each of a ray, by their classes."""
+        unused = targets[0]
+        values: dict[str, Any] = {"takes_all": source is None}
+        for i in range(_NEW_LISTS):
+            path_list, of_ray = targets[i] if i < len(targets) else unused
+            values |= {
+                f"class_{i}": _CLASSES[path_list] if i < len(targets) else PathClass(0),
+                f"list_{i}": self._list(path_list, of_ray),
+                f"length_{i}": _length_place(path_list, of_ray),
+            }
+        size = -(-bound // layout.COMPACT_BLOCK)
+        self._launch_listed("compact", chunk, ray, size, source or PathList.LIVE, **values)
 
-    def _launch(
+    def _list(self, path_list: PathList, ray: int) -> cl.Buffer:
+        return self._live[ray % 2] if path_list == PathList.LIVE else self._lists[path_list]
+
+    def _launch_listed(
         self,
         name: str,
-        size: int,
-        radiance: cl.Buffer,
-        scene: SceneTables | None = None,
+        chunk: _Chunk,
+        ray: int,
+        bound: int,
+        paths: PathList,
         features: tuple[str, ...] = (),
         **values: Any,
     ) -> None:
+        """Launch a kernel over a list of paths, which are `bound` at most."""
+        values |= {"list": self._list(paths, ray), "lengths": self._lengths}
+        values["length_place"] = _length_place(paths, ray)
+        self._launch(name, chunk, bound, features, **values)
+
+    def _launch(
+        self, name: str, chunk: _Chunk, size: int, features: tuple[str, ...] = (), **values: Any
+    ) -> None:
         """Launch a kernel; its arguments are `values` by name, the planes of paths, and the buffers of the
-        scene. `count` is the number of work-items that have something to do, if `values` does not say it."""
-        known = {**self._planes, "radiance": radiance, "count": size, **values}
-        arguments = bindings.arguments(bindings.KERNELS[name], known, scene)
+        scene."""
+        known = {**self._planes, "params": chunk.params, "radiance": chunk.radiance, **values}
+        arguments = bindings.arguments(bindings.KERNELS[name], known, chunk.scene)
         kernel = self.device.kernel(name, features=features)
         self.device.launch(kernel, max(size, self._least_size), *arguments)
+
+
+def _length_place(path_list: PathList, ray: int) -> int:
+    """Where the length of a list of a ray stands."""
+    return len(PathList) * ray + path_list

@@ -99,7 +99,14 @@ class World:
         } | planes
         buffers = {kind: self.device.upload(array) for kind, array in state.items()}
         path_list = self.device.upload(np.arange(count, dtype=np.uint32))
-        values = {"params": params, "count": count, "list": path_list, **self.buffers, **buffers}
+        values = {
+            "params": params,
+            "lengths": self.device.upload(np.array([count], np.uint32)),
+            "length_place": 0,
+            "list": path_list,
+            **self.buffers,
+            **buffers,
+        }
         arguments = bindings.arguments(bindings.KERNELS[name], values)
         self.device.launch(self.device.kernel(name), count, *arguments)
         return {kind: self.device.read(buffers[kind], array.copy()) for kind, array in planes.items()}

@@ -60,10 +60,16 @@ class Buffers:
 
 def test_arguments_are_found_by_name() -> None:
     groups = (bindings.LIST, bindings.BRUTE_FORCE)
-    values: Mapping[str, Any] = {"list": "mine", "count": 7, "quads": "others", "unused": 1}
+    values: Mapping[str, Any] = {
+        "list": "mine",
+        "lengths": "all",
+        "length_place": 7,
+        "quads": "others",
+        "unused": 1,
+    }
     found = bindings.arguments(groups, values, Buffers())
-    assert found == [7, "mine", "others", "PARALLELEPIPEDS", "CLUSTERS", 3]
-    assert isinstance(found[0], np.uint32) and isinstance(found[-1], np.uint32)
+    assert found == ["all", 7, "mine", "others", "PARALLELEPIPEDS", "CLUSTERS", 3]
+    assert isinstance(found[1], np.uint32) and isinstance(found[-1], np.uint32)
 
 
 def test_an_argument_that_nothing_is_bound_to_is_named() -> None:

@@ -61,6 +61,7 @@ def test_constants_and_planes_are_in_the_header() -> None:
         layout.PathPlane,
         layout.ShadowPlane,
         layout.LightPlane,
+        layout.PathList,
     ],
 )
 def test_planes_are_numbered_without_gaps(enum: type[IntEnum]) -> None:
@@ -75,5 +76,6 @@ def test_numbers_that_share_a_word_do_not_overlap() -> None:
         assert sum(masks) == int(np.bitwise_or.reduce(np.array(masks, np.uint64)))
     assert 1 << layout.PLACE_ON_TOP.shift == layout.NODE_PACK
     assert layout.PLACE_LANE.mask == layout.BVH_WIDTH - 1
-    assert layout.COUNTS_RAY.mask >= layout.MOST_RAYS
+    assert layout.COUNTS_RAY.mask + 1 == layout.MOST_RAYS
+    assert layout.MOST_RAYS_IN_MEDIA < layout.MOST_RAYS
     assert layout.MEDIUM_LOW.mask == layout.MEDIUM_HIGH.mask == layout.MEDIUM_NONE

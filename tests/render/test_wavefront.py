@@ -1,0 +1,73 @@
+"""The wavefront keeps the lengths of its lists on the device, and goes through the same stages as blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from support.small_scenes import mixed_scene
+
+from incpt.benchmarks.kit.scenes import cornell, glass
+from incpt.core import layout
+from incpt.device.device import Device
+from incpt.render.schedule import scheduled
+from incpt.render.session import Session
+from incpt.scene.model import Scene
+from incpt.tables.geometry_pool import GeometryPool
+from incpt.tables.scene_tables import SceneTables, tables_of
+
+
+def described(device: Device, scene: Scene) -> SceneTables:
+    return tables_of(GeometryPool.of(device), scene)
+
+
+@pytest.mark.parametrize("make", [cornell, glass, mixed_scene], ids=lambda make: make.__name__)
+def test_a_step_waits_for_one_read(
+    make: Callable[[], Scene], device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """That of the film, when all is done; what the lists of paths hold is not waited for by reading it."""
+    session = Session(make(), size=(32, 24), device=device)
+    session._wavefront.in_blocks = False
+    session.step()
+    read, count = device.read, []
+
+    def counted(*args: Any) -> Any:
+        count.append(args)
+        return read(*args)
+
+    monkeypatch.setattr(device, "read", counted)
+    session.step()
+    assert len(count) == 1
+
+
+def test_rays_end_where_the_scene_allows_no_more(device: Device) -> None:
+    params = np.zeros((), layout.PARAMS)
+    params["max_bounces"] = 3
+    opaque, clear = (described(device, make()) for make in (cornell, glass))
+    assert scheduled(params, opaque)["last_ray"] == 4
+    assert scheduled(params, clear)["last_ray"] == layout.MOST_RAYS - 1
+    assert params["last_ray"] == 0  # the parameters of the caller stay as they are
+    params["max_bounces"] = 255
+    assert scheduled(params, opaque)["last_ray"] == layout.MOST_RAYS - 1
+
+
+def test_light_from_far_away_is_looked_for_where_there_is_some(device: Device) -> None:
+    params = np.zeros((), layout.PARAMS)
+    scene = cornell()
+    for color, sees_sky in (((0, 0, 0), 0), ((0, 0, 0.1), 1)):
+        tables = described(device, scene.with_environment(color=color))
+        assert scheduled(params, tables)["sees_sky"] == sees_sky
+
+
+def test_long_paths_in_media_end(device: Device) -> None:
+    """Many more rays than are enqueued ahead, of paths that end at different times."""
+    images = []
+    for in_blocks in (False, True):
+        session = Session(mixed_scene(transmission_bounces=40, max_bounces=20), size=(24, 16), device=device)
+        session._wavefront.in_blocks &= in_blocks
+        session.render(4)
+        images.append(session.image())
+    np.testing.assert_allclose(images[0].mean(), images[1].mean(), rtol=1e-3)
+    assert np.median(np.abs(images[0] - images[1])) < 1e-5
