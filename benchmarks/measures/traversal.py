@@ -209,7 +209,7 @@ def _ray_values(rays: Rays, planes: cl.Buffer, limits: cl.Buffer) -> dict[str, A
 
 def camera_rays(camera: Camera, size: tuple[int, int], in_squares: bool = False) -> Rays:
     """Through the pixels' centres, tile by tile of 16 x 16, and in each row by row or in squares, as
-    cl/tile.cl does it: coherent."""
+    cl/path/tile.cl does it: coherent."""
     width, height = size
     right, up, forward = camera.image_plane(width / height)
     y, x = (places.ravel() for places in np.mgrid[0:height, 0:width])

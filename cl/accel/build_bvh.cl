@@ -39,7 +39,7 @@ static float lane(const float8 v, uint i) {
     return i == 0 ? v.s0 : i == 1 ? v.s1 : i == 2 ? v.s2 : i == 4 ? v.s4 : i == 5 ? v.s5 : v.s6;
 }
 
-// Half the surface.
+// Half the surface of a box.
 static float box_area(const Box box) {
     const float x = -box.s4 - box.s0, y = -box.s5 - box.s1, z = -box.s6 - box.s2;
     return x * y + y * z + z * x;
@@ -60,7 +60,7 @@ static Range range_around(__global const Box *boxes, uint start, uint count) {
     return range;
 }
 
-// Bins per unit along an axis; 0 where all centres fall together.
+// How many bins a unit of length has along an axis. It is 0 where all centres fall together.
 static float bin_scale(const Box centers, uint axis) {
     const float extent = -lane(centers, axis + 4) - lane(centers, axis);
     const float scale = BVH_BINS * 0.999f / extent;
@@ -152,7 +152,8 @@ static void partition(__global Box *boxes, const Range range, const Split split,
     *right = (Range){i, range.start + range.count - i, right_bounds, right_centers};
 }
 
-// Halves the range at the median along its widest axis: always possible, also where all centres coincide.
+// Halves the range at the median along its widest axis. That is always possible, also where all centres
+// coincide.
 static void halve(__global Box *boxes, const Range range, Range *left, Range *right) {
     const Box extent = -range.centers.s45674567 - range.centers;
     const uint axis = extent.s0 >= extent.s1 && extent.s0 >= extent.s2 ? 0 : extent.s1 >= extent.s2 ? 1 : 2;
@@ -183,7 +184,8 @@ static void halve(__global Box *boxes, const Range range, Range *left, Range *ri
     *right = range_around(boxes, middle, range.start + range.count - middle);
 }
 
-// The child that is split next: of largest area, or of most primitives to get an even tree; 8 for none.
+// The child that is split next: the one of largest area, or, for an `even` tree, the one of most primitives.
+// BVH_WIDTH where none can be split.
 static uint choose_child(const Range *children, uint child_count, uint leaf_size, bool even) {
     uint chosen = BVH_WIDTH;
     float largest = -1.0f;
@@ -216,8 +218,8 @@ static Box face_box(__global const int *faces, __global const float *vertices, u
     return box;
 }
 
-// Copies a face into a lane of a pack. A face without area gets no numbers for vertices, as do unused lanes:
-// every comparison with them is false, so that no ray meets them and a hit always has a normal.
+// Copies a face into a lane of a pack. The vertices of a face without area become NaN, like those of unused
+// lanes: every comparison with them is false, so that no ray meets them and a hit always has a normal.
 static void write_face(__global TrianglePack *pack, uint lane_index, __global const int *faces,
                        __global const float *vertices, uint face) {
     Vec3 vertex[3];
@@ -352,7 +354,7 @@ static void write_order(__global Node *node) {
         for (uint child = 0; child < BVH_WIDTH; child++) {
             depth[child] = 0.0f;
             for (uint axis = 0; axis < 3; axis++) {
-                // Scaled, so that no sum leaves the range of a float.
+                // The bounds are scaled, so that no sum leaves the range of a float.
                 const float sum =
                     0.125f * node->bounds[2 * axis][child] + 0.125f * node->bounds[2 * axis + 1][child];
                 depth[child] += octant >> axis & 1 ? -sum : sum;

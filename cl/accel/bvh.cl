@@ -1,22 +1,22 @@
 // Two-level traversal of 8-wide bounding volume hierarchies: closest hit and any hit.
 //
-// Watertight (Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection"): the sign of an edge
-// function, a product compared with a product, cannot come out wrong as long as both are rounded alike, so a
-// ray that meets a shared edge or vertex is inside at least one of the faces there. Contracting one of the
-// products into a fused multiply-add would break that.
-// Box tests err on the side of a hit (Ize 2013, "Robust BVH Ray Traversal"): should huge coordinates along a
-// zero direction overflow to NaN, the order of operands in BVH_MIN8 and BVH_MAX8 drops that axis.
+// The triangle test is watertight (Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection"): the
+// sign of an edge function, a product compared with a product, cannot come out wrong as long as both products
+// are rounded alike, so that a ray which meets a shared edge or vertex is inside at least one of the faces
+// there. Contracting one of the products into a fused multiply-add would break that.
+// The box test errs on the side of a hit (Ize 2013, "Robust BVH Ray Traversal"). Where huge coordinates along
+// a zero direction overflow to NaN, the order of operands in BVH_MIN8 and BVH_MAX8 leaves that axis out.
 
 #include "accel/slab.cl"
 
 #define BVH_STACK_SIZE ((BVH_WIDTH - 1) * BVH_MAX_DEPTH + 1)
-#define BVH_TOP_STACK_SIZE (2 * BVH_STACK_SIZE) // a tree of objects may go on as one of triangles
+#define BVH_TOP_STACK_SIZE (2 * BVH_STACK_SIZE) // below a tree over objects there may be one over packs
 #define BVH_PLANE_BYTES (BVH_WIDTH * sizeof(float))
 #define BVH_MIN8(a, b) ((a) < (b) ? (a) : (b))
 #define BVH_MAX8(a, b) ((a) > (b) ? (a) : (b))
 
-// Inlined by force, and with the compiler's own bit operations where it has them: in PoCL a call in the inner
-// loop spills every vector register.
+// All functions are inlined by force, and bit operations are the compiler's own where it has them, because in
+// PoCL a call in the inner loop spills every vector register.
 #ifdef __clang__
 #define BVH_COUNT_BITS(x) ((uint)__builtin_popcount(x))
 #define BVH_FIRST_BIT(x) ((uint)__builtin_ctz(x))
@@ -37,7 +37,7 @@ typedef struct {
     Slab slab[3];
     size_t near_plane[3]; // offset in a node, bytes
     size_t axis[3];       // x, y and z of the triangle test, as offsets in a pack, bytes
-    float origin[3];      // along these
+    float origin[3];      // along x, y and z of the triangle test
     float shear[3];
 } BvhRay;
 

@@ -306,7 +306,8 @@ STAGE void interleaved_nearest(const Block *block, uint count, uint listed) {
 }
 
 #ifdef LIGHT_SAMPLING
-// The same of shadow rays, of `count` paths: adds the radiance of those that nothing is in the way of.
+// Traces the shadow rays of the first `listed` paths in the list, which are some of `count` paths, and adds
+// the radiance of those rays that nothing is in the way of.
 STAGE void interleaved_any(const Block *block, uint count, uint listed) {
     __local float *prepared = PLANES(block->memory, PREPARED_SHADOWS);
     prepare_rays(prepared, block->state.shadows, count);

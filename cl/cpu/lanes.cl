@@ -2,8 +2,8 @@
 
 // SIMD lanes over the paths of a block: loops that the compiler vectorises, and vectors by hand.
 
-// The iterations are independent of each other, in whatever order. LLVM knows it from a note on the function
-// call in the loop, which is lost where an argument is a constant or not used.
+// Stands before a loop whose iterations are independent of each other. LLVM keeps this as a note on the
+// function call in the loop, and loses the note where an argument of the call is a constant or is not used.
 #ifdef __clang__
 #define LANES _Pragma("clang loop vectorize(assume_safety) vectorize_width(16) interleave(disable)")
 #else
@@ -19,8 +19,8 @@
 
 #define LANE_COUNT 16
 
-// Without AVX-512 clang warns that float16 is passed otherwise than with it; nothing is passed to other
-// programs.
+// Without AVX-512 clang warns that float16 is passed to functions in another way than with it. That does no
+// harm, because nothing is passed to other programs.
 #ifdef __clang__
 #pragma clang diagnostic ignored "-Wpsabi"
 #endif

@@ -1,11 +1,11 @@
 #include "base/scalar.cl"
 
-// The order of the pixels of a tile: in squares of 4 x 4 where its edge allows and trees are traced, since
-// sixteen neighbours that keep together share their way through one; else, and from square to square, row by
-// row.
+// The order in which the pixels of a tile are taken. Where rays go through trees, and the edge of the tile is
+// a multiple of 4, they are taken in squares of 4 x 4, because sixteen neighbours then share their way
+// through a tree. The squares follow each other row by row, and so do the pixels of a tile without squares.
 
 typedef struct {
-    uint x, y; // in the tile
+    uint x, y; // counted from the corner of the tile
 } TilePixel;
 
 // a / b, exactly: the quotient of two 32-bit integers is farther from the next whole number than a double

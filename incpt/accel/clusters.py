@@ -144,7 +144,11 @@ def _rows(
     rows["vertex"] = vertices[corners].reshape(-1, 12)
     rows["place"] = places[faces]
     rows["object"] = each([part.index for part in parts])
-    rows["turns"] = turns[:, 0] | turns[:, 1] << np.uint32(2) | along << np.uint32(4)
+    rows["turns"] = (
+        turns[:, 0]
+        | turns[:, 1] << np.uint32(layout.TURNS_SECOND.shift)
+        | along << np.uint32(layout.TURNS_AXIS_B.shift)
+    )
     firsts = np.cumsum([0, *counts[:-1]])
     starts = np.zeros(len(rows), np.intp)
     starts[[first + start for quads, first in zip(own, firsts, strict=True) for start in quads.groups]] = 1

@@ -399,7 +399,7 @@ PARAMS = _packed(
         ("width", np.uint32),
         ("height", np.uint32),
         ("tile_size", np.uint32),
-        ("in_squares", np.uint32),  # 1: pixels of a tile are taken in squares, see cl/tile.cl
+        ("in_squares", np.uint32),  # 1: pixels of a tile are taken in squares, see cl/path/tile.cl
         ("first_path", np.uint32),  # of this chunk in the path buffer
         ("path_count", np.uint32),  # in this chunk
         ("path_stride", np.uint32),  # of the planes of path state

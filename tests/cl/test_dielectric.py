@@ -1,4 +1,4 @@
-"""Boundaries of transparent bodies (cl/dielectric.cl) and the stack of nested ones (cl/medium.cl)."""
+"""Boundaries of transparent bodies (cl/shading/dielectric.cl), and the stack of nested ones (medium.cl)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The opaque surface of cl/material.cl: its samples, its symmetry, and its energy."""
+"""The opaque surface of cl/shading/material.cl: its samples, its symmetry, and its energy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The random numbers of cl/rng.cl: what they are, how well they fill the square, and that nothing is
+"""The random numbers of cl/base/rng.cl: what they are, how well they fill the square, and that nothing is
 correlated with anything."""
 
 from __future__ import annotations

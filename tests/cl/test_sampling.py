@@ -1,4 +1,4 @@
-"""cl/sampling.cl and the mathematics of cl/scalar.cl, against formulas in double precision."""
+"""cl/base/sampling.cl and the mathematics of cl/base/scalar.cl, against formulas in double precision."""
 
 from __future__ import annotations
 
