@@ -110,18 +110,6 @@ class SceneTables:
         black = environment.image is not None and not self.environment.has_image
         return (0.0, 0.0, 0.0) if black else environment.radiance
 
-    @property
-    def geometry(self) -> tuple[cl.Buffer, ...]:
-        """What traversal reads: top nodes and packs, nodes, packs, objects, materials."""
-        names = ("top_nodes", "top_packs", "nodes", "packs", "objects", "materials")
-        return tuple(self.buffer(name) for name in names)
-
-    @property
-    def emitters(self) -> tuple[cl.Buffer, ...]:
-        """Triangle lights, and the environment's image and tables."""
-        names = ("lights", "environment_image", "marginal", "conditional", "texel_pdf")
-        return tuple(self.buffer(name) for name in names)
-
     @cached_property
     def _is_flat(self) -> bool:
         return all(mesh.normals is None for mesh in self.meshes)

@@ -12,6 +12,7 @@ import pytest
 from support.small_scenes import mixed_scene
 
 from incpt.benchmarks.kit.scenes import cornell, glass, plates
+from incpt.core import arena
 from incpt.core.errors import DeviceError, InputError
 from incpt.device import pocl, program
 from incpt.device.device import DEVICE_VARIABLE, Device, all_devices, choose, device_name
@@ -202,6 +203,20 @@ def test_blocks_are_the_same_without_instructions_of_avx512(
         images.append(session.image())
         portable = (*session._tables.variant, "PORTABLE_LANES")
         monkeypatch.setattr(SceneTables, "variant", portable)
+    np.testing.assert_allclose(images[0], images[1], rtol=1e-5)
+
+
+@pytest.mark.parametrize("make", [mixed_scene, cornell], ids=lambda make: make.__name__)
+def test_blocks_of_every_size_make_the_same_picture(make: Callable[[], Scene], device: Device) -> None:
+    if not traces_in_blocks(device):
+        pytest.skip("no blocks on this device")
+    images = []
+    for paths in arena.BLOCK_SIZES:
+        own = Device()
+        own.block_paths = paths
+        session = Session(small(make), device=own)
+        session.render(8)
+        images.append(session.image())
     np.testing.assert_allclose(images[0], images[1], rtol=1e-5)
 
 
