@@ -175,7 +175,14 @@ def small(make: Callable[[], Scene]) -> Scene:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("make", [mixed_scene, cornell, glass, plates], ids=lambda make: make.__name__)
+def half_clear_scene() -> Scene:
+    """One of whose bodies is opaque for half of the paths that meet it."""
+    return mixed_scene().with_material("glass", transmission=0.5)
+
+
+@pytest.mark.parametrize(
+    "make", [mixed_scene, half_clear_scene, cornell, glass, plates], ids=lambda make: make.__name__
+)
 def test_blocks_and_wavefront_agree(make: Callable[[], Scene], device: Device) -> None:
     """The kernel that traces blocks of paths on CPUs, and the wavefront of all other devices."""
     if not traces_in_blocks(device):
