@@ -71,3 +71,15 @@ def test_long_paths_in_media_end(device: Device) -> None:
         images.append(session.image())
     np.testing.assert_allclose(images[0].mean(), images[1].mean(), rtol=1e-3)
     assert np.median(np.abs(images[0] - images[1])) < 1e-5
+
+
+def test_work_items_without_a_path_leave_those_of_others_alone(device: Device) -> None:
+    """In chunks of another size other work-items lie beyond the lists."""
+    images = []
+    for chunk_paths in (320, 1 << 12):
+        session = Session(mixed_scene(), size=(32, 24), device=device)
+        session._wavefront.in_blocks = False
+        session._wavefront.chunk_paths = chunk_paths
+        session.render(4)
+        images.append(session.image())
+    np.testing.assert_array_equal(*images)
