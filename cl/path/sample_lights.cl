@@ -1,4 +1,5 @@
 #include "path/state.cl"
+#include "scene/light.cl"
 
 #ifdef LIGHT_SAMPLING
 // Chooses a light for a path that stands on a surface: a direction, the radiance that comes along it when

@@ -1,4 +1,5 @@
 #include "path/state.cl"
+#include "scene/light.cl"
 #include "shading/material.cl"
 
 // What happens where a ray ends on an opaque surface: the path gathers what is emitted there, asks for a

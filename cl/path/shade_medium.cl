@@ -1,4 +1,5 @@
 #include "path/state.cl"
+#include "scene/light.cl"
 #include "shading/dielectric.cl"
 
 // What happens where a ray ends on a transparent body, or inside one: absorption on the way, then the

@@ -1,4 +1,5 @@
 #include "path/state.cl"
+#include "scene/light.cl"
 
 // Radiance from far away for a path whose ray left the scene, weighted against light sampling of the
 // environment. The path ends with it. The variant MEDIA serves scenes with transparent bodies: from inside

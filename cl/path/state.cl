@@ -1,4 +1,5 @@
-#include "scene/light.cl"
+#include "base/sampling.cl"
+#include "scene/light_sample.cl"
 #include "shading/medium.cl"
 
 // The state of paths, as planes: plane p of path i is planes[p * stride + i].

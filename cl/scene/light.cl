@@ -1,4 +1,5 @@
 #include "base/sampling.cl"
+#include "scene/light_sample.cl"
 
 // Emitters: triangles, and the environment. Which exist is known when a kernel is built
 // (ENVIRONMENT_IMAGE, TRIANGLE_LIGHTS), so that a scene does not pay for emitters that it does not have.
@@ -7,13 +8,6 @@
 #if defined(ENVIRONMENT_IMAGE) || defined(TRIANGLE_LIGHTS)
 #define LIGHT_SAMPLING
 #endif
-
-typedef struct {
-    Vec3 direction;
-    float distance;
-    Vec3 radiance; // what arrives if nothing is in the way
-    float pdf;     // of the direction, per solid angle; 0 where the sample failed
-} LightSample;
 
 // Place in the lat-long image, in [0, 1) x [0, 1], of a direction. OpenEXR: the centre looks to +z, three
 // quarters to the right is -x, the top row is +y; the rotation turns the image right-handed about +y.
