@@ -71,6 +71,6 @@ class OrderedSession(Session):
         filled = self.device.upload(slots)
         self.device.finish()
         began = time.perf_counter()
-        self._wavefront.trace(self._tables, params, filled, paths, path_buffer.floats)
+        self._tracer.trace(self._tables, params, filled, paths, path_buffer.floats)
         self.device.finish()
         return time.perf_counter() - began

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import pyopencl as cl
 from incpt.core import arena, bindings
 from incpt.device.device import Device
 from incpt.render.schedule import scheduled
+from incpt.render.wavefront import Wavefront
 from incpt.tables.scene_tables import SceneTables
 
 
@@ -20,21 +22,48 @@ def traces_in_blocks(device: Device) -> bool:
     return device.block_paths is not None
 
 
-def trace(
-    device: Device,
-    scene: SceneTables,
-    params: npt.NDArray[np.void],
-    slots: cl.Buffer,
-    path_count: int,
-    radiance: cl.Buffer,
-) -> None:
-    """Trace `path_count` paths, those of `slots` in order; `radiance` gets what each brings, as three planes
-    of params["buffer_stride"] floats. No path at all builds the kernel."""
-    whole = scheduled(params, scene)
-    whole["path_count"] = path_count
-    kernel = device.kernel("trace_blocks", features=scene.variant)
-    values = {"params": whole, "slots": slots, "path_buffer": radiance}
-    launch(device, kernel, bindings.KERNELS["trace_blocks"], path_count, values, scene)
+class BlockTracer:
+    """Traces the paths of a step block by block. First hits, which are few and seldom asked for, come from a
+    wavefront."""
+
+    def __init__(self, device: Device) -> None:
+        self.device = device
+        self._wavefront = Wavefront(device)
+
+    def trace(
+        self,
+        scene: SceneTables,
+        params: npt.NDArray[np.void],
+        slots: cl.Buffer,
+        path_count: int,
+        radiance: cl.Buffer,
+    ) -> None:
+        """See `tracer.Tracer`. No path at all builds the kernel."""
+        whole = scheduled(params, scene)
+        whole["path_count"] = path_count
+        kernel = self.device.kernel("trace_blocks", features=scene.variant)
+        values = {"params": whole, "slots": slots, "path_buffer": radiance}
+        launch(self.device, kernel, bindings.KERNELS["trace_blocks"], path_count, values, scene)
+
+    def first_hits(
+        self,
+        scene: SceneTables,
+        params: npt.NDArray[np.void],
+        slots: cl.Buffer,
+        path_count: int,
+        surface: cl.Buffer,
+        object_ids: cl.Buffer,
+        radiance: cl.Buffer,
+    ) -> None:
+        """See `tracer.Tracer`."""
+        self._wavefront.first_hits(scene, params, slots, path_count, surface, object_ids, radiance)
+
+    def idle_launches(
+        self, scene: SceneTables, params: npt.NDArray[np.void], slots: cl.Buffer, radiance: cl.Buffer
+    ) -> list[Callable[[], None]]:
+        """See `tracer.Tracer`. A work-item is a block of paths, so that grids are small always."""
+        first_hits = self._wavefront.idle_first_hits(scene, params, slots, radiance)
+        return [*first_hits, partial(self.trace, scene, params, slots, 0, radiance)]
 
 
 def launch(

@@ -16,7 +16,7 @@ from incpt.core.settings import RenderSettings
 from incpt.render import tiles
 from incpt.render.params import launch_params
 from incpt.render.plan import Cursor, Queue, plan_step
-from incpt.render.wavefront import Wavefront
+from incpt.render.tracer import Tracer
 from incpt.tables.scene_tables import SceneTables
 
 _SURFACE_PLANES = 7
@@ -35,7 +35,7 @@ class Aovs:
 
 
 def first_hits(
-    tracer: Wavefront,
+    tracer: Tracer,
     tables: SceneTables,
     settings: RenderSettings,
     size: tuple[int, int],
@@ -68,7 +68,7 @@ def first_hits(
 
 
 def object_at(
-    tracer: Wavefront, tables: SceneTables, settings: RenderSettings, point: tuple[float, float]
+    tracer: Tracer, tables: SceneTables, settings: RenderSettings, point: tuple[float, float]
 ) -> str | None:
     """The name of the object at a point (x, y) from the top left, in units of the picture, or None."""
     params = launch_params(tables, settings)
@@ -89,7 +89,7 @@ def one_slot() -> npt.NDArray[np.void]:
 
 
 def _traced(
-    tracer: Wavefront, tables: SceneTables, slots: npt.NDArray[np.void], params: npt.NDArray[np.void]
+    tracer: Tracer, tables: SceneTables, slots: npt.NDArray[np.void], params: npt.NDArray[np.void]
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]:
     """(_SURFACE_PLANES * pixels,) and (pixels,) as cl/film/first_hits.cl fills them."""
     device = tracer.device

@@ -26,7 +26,7 @@ from incpt.render.path_buffer import PathBuffer, slots_of
 from incpt.render.plan import Cursor, Queue
 from incpt.render.progress import Progress
 from incpt.render.strategies import TracedStep, strategy_of
-from incpt.render.wavefront import Wavefront
+from incpt.render.tracer import tracer_of
 from incpt.scene.change import Change, diff
 from incpt.scene.model import Scene
 from incpt.tables.geometry_pool import GeometryPool
@@ -87,7 +87,7 @@ class Session:
         settings = scene.settings if settings is None else settings
         settings = settings if size is None else replace(settings, size=size)
         self.device = device if isinstance(device, Device) else Device(device)
-        self._wavefront = Wavefront(self.device)
+        self._tracer = tracer_of(self.device)
         tables = tables_of(GeometryPool.of(self.device), scene)
         film = _new_film(self.device, settings)
         path_buffer = PathBuffer.of_settings(self.device, settings, None)
@@ -148,8 +148,8 @@ class Session:
         params = self._params(path_buffer)
         filled = self.device.upload(plan.slots)
         paths = len(plan.slots) * settings.tile_size**2
-        self._wavefront.trace(self._tables, params, filled, paths, path_buffer.floats)
-        traced = TracedStep(self._wavefront, self._tables, params, plan, filled, path_buffer.floats)
+        self._tracer.trace(self._tables, params, filled, paths, path_buffer.floats)
+        traced = TracedStep(self._tracer, self._tables, params, plan, filled, path_buffer.floats)
         strategy_of(settings).merge(traced, film)
         nonfinite = film.take_nonfinite()
         self._state = replace(
@@ -231,7 +231,7 @@ class Session:
         """Auxiliary images of the scene as it is now, of the session's size or another; see Aovs. `rows`:
         from the first of them up to the second only."""
         size = self.size if size is None else size
-        return first_hits.first_hits(self._wavefront, self._tables, self.settings, size, rows)
+        return first_hits.first_hits(self._tracer, self._tables, self.settings, size, rows)
 
     def pick(self, pixel: tuple[int, int]) -> str | None:
         """The name of the object under a pixel (x, y) from the top left, or None. Raises InputError outside
@@ -244,7 +244,7 @@ class Session:
 
     def pick_point(self, point: tuple[float, float]) -> str | None:
         """The name of the object at a point (x, y) from the top left, in units of the image, or None."""
-        return first_hits.object_at(self._wavefront, self._tables, self.settings, point)
+        return first_hits.object_at(self._tracer, self._tables, self.settings, point)
 
     def build(self, on_progress: Callable[[int, int], None] | None = None) -> None:
         """Build every kernel that the scene as it is now needs, so that no later call has to wait for one.
@@ -256,7 +256,7 @@ class Session:
         film, path_buffer = self._state.film, self._state.path_buffer
         params, slots = self._params(path_buffer), self.device.upload(first_hits.one_slot())
         steps = [
-            *self._wavefront.idle_launches(self._tables, params, slots, path_buffer.floats),
+            *self._tracer.idle_launches(self._tables, params, slots, path_buffer.floats),
             *film.idle_launches(params, path_buffer.floats),
         ]
         for done, step in enumerate(steps, 1):

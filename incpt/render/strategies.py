@@ -33,7 +33,7 @@ from incpt.render.film import RADIANCE, Film, FilmPass, Float32Array
 from incpt.render.modes import Mode
 from incpt.render.plan import CountArray, Plan, Queue
 from incpt.render.tiles import IntArray, TileGrid
-from incpt.render.wavefront import Wavefront
+from incpt.render.tracer import Tracer
 from incpt.scene.camera import Camera
 from incpt.scene.model import Object, Scene
 from incpt.tables.scene_tables import SceneTables
@@ -87,7 +87,7 @@ class TracedStep:
              The tracer fills those of radiance.
     """
 
-    tracer: Wavefront
+    tracer: Tracer
     tables: SceneTables
     params: npt.NDArray[np.void]
     plan: Plan

@@ -26,7 +26,6 @@ import pyopencl as cl
 from incpt.core import bindings, layout
 from incpt.core.layout import PathClass, PathList
 from incpt.device.device import BUILD_SIZES, Device
-from incpt.render import blocks
 from incpt.render.schedule import scheduled
 from incpt.tables.scene_tables import SceneTables
 
@@ -69,7 +68,6 @@ class Wavefront:
 
     def __init__(self, device: Device) -> None:
         self.device = device
-        self.in_blocks = blocks.traces_in_blocks(device)
         self.chunk_paths = device.tuning.chunk_paths
         # The last place is a scratch path, which idle lanes of a group read and write.
         self.stride = self.chunk_paths + layout.WORK_GROUP_SIZE
@@ -94,9 +92,6 @@ class Wavefront:
     ) -> None:
         """Trace `path_count` paths, those of `slots` in order; `radiance` holds what each brings, as three
         planes of params["buffer_stride"] floats."""
-        if self.in_blocks:
-            blocks.trace(self.device, scene, params, slots, path_count, radiance)
-            return
         for chunk in self._chunks(scene, params, path_count, radiance):
             self._trace_chunk(chunk, slots)
 
@@ -122,29 +117,34 @@ class Wavefront:
         """A launch of every kernel that `trace` and `first_hits` may need for this scene, each with nothing
         to do; see `Device.built`. `slots` holds one slot, which lanes without a path read."""
         chunk = self._chunk(scene, params, 0, 0, radiance)
-        nothing = self._lengths
         stages: list[Callable[[], object]] = [
-            partial(self._generate, chunk, slots),
-            partial(self._intersect, chunk, 0, 0),
-            partial(self._first_hits, chunk, nothing, nothing),
+            partial(self._sample_lights, chunk, 0, 0, PathList.SURFACE),
+            partial(self._shade, chunk, 0, 0),
+            partial(self._trace_shadows, chunk, 0, 0),
+            partial(self._shade_misses, chunk, 0, 0),
         ]
-        if not self.in_blocks:
-            stages += [
-                partial(self._sample_lights, chunk, 0, 0, PathList.SURFACE),
-                partial(self._shade, chunk, 0, 0),
-                partial(self._trace_shadows, chunk, 0, 0),
-                partial(self._shade_misses, chunk, 0, 0),
+        if scene.has_media:
+            stages.append(partial(self._shade_media, chunk, 0, 0))
+        else:
+            stages.append(partial(self._shade, chunk, 0, 0, last=True))
+        return [*self.idle_first_hits(scene, params, slots, radiance), *self._idle(stages)]
+
+    def idle_first_hits(
+        self, scene: SceneTables, params: npt.NDArray[np.void], slots: cl.Buffer, radiance: cl.Buffer
+    ) -> list[Callable[[], None]]:
+        """As `idle_launches`, of the kernels that `first_hits` needs alone."""
+        chunk = self._chunk(scene, params, 0, 0, radiance)
+        nothing = self._lengths
+        return self._idle(
+            [
+                partial(self._generate, chunk, slots),
+                partial(self._intersect, chunk, 0, 0),
+                partial(self._first_hits, chunk, nothing, nothing),
             ]
-            if scene.has_media:
-                stages.append(partial(self._shade_media, chunk, 0, 0))
-            else:
-                stages.append(partial(self._shade, chunk, 0, 0, last=True))
-        launches: list[Callable[[], None]] = [
-            partial(self._launch_idle, stage, size) for stage in stages for size in BUILD_SIZES
-        ]
-        if self.in_blocks:  # a work-item is a block of paths, so that grids are small always
-            launches.append(partial(blocks.trace, self.device, scene, params, slots, 0, radiance))
-        return launches
+        )
+
+    def _idle(self, stages: list[Callable[[], object]]) -> list[Callable[[], None]]:
+        return [partial(self._launch_idle, stage, size) for stage in stages for size in BUILD_SIZES]
 
     def _launch_idle(self, stage: Callable[[], object], size: int) -> None:
         self._least_size = size

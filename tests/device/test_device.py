@@ -18,6 +18,7 @@ from incpt.device import pocl, program
 from incpt.device.device import DEVICE_VARIABLE, Device, all_devices, choose, device_name
 from incpt.render.blocks import traces_in_blocks
 from incpt.render.session import Session
+from incpt.render.wavefront import Wavefront
 from incpt.scene.image import Image
 from incpt.scene.material import Material
 from incpt.scene.model import Scene
@@ -190,7 +191,7 @@ def test_blocks_and_wavefront_agree(make: Callable[[], Scene], device: Device) -
     images = []
     for in_blocks in (False, True):
         session = Session(small(make), device=device)
-        session._wavefront.in_blocks = in_blocks
+        session._tracer = session._tracer if in_blocks else Wavefront(device)
         session.render(8)
         images.append(session.image())
     assert np.median(np.abs(images[0] - images[1])) < 1e-5

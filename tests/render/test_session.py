@@ -14,6 +14,7 @@ from incpt.render.modes import Mode
 from incpt.render.plan import Cursor, Queue
 from incpt.render.session import Session
 from incpt.render.tiles import base_queue
+from incpt.render.wavefront import Wavefront
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
 from incpt.scene.material import Material
@@ -122,7 +123,8 @@ def test_paths_go_in_squares_where_they_go_through_trees(device: Device) -> None
 
 def test_chunks_do_not_matter(device: Device, converged: np.ndarray) -> None:
     session = Session(mixed_scene(base_nor=4), device=device)
-    session._wavefront.chunk_paths = 320  # less than a group of slots
+    session._tracer = wavefront = Wavefront(device)
+    wavefront.chunk_paths = 320  # less than a group of slots
     session.render(64)
     assert_same(session.image(), converged)
 
@@ -342,7 +344,7 @@ def test_no_kernel_is_built_after_building(
         monkeypatch.setattr(device, "_kernels", {})
         monkeypatch.setattr(device, "built", set())
         session = Session(scene, device=device)
-        session._wavefront.in_blocks &= in_blocks
+        session._tracer = session._tracer if in_blocks else Wavefront(device)
         seen: list[tuple[int, int]] = []
         session.build(lambda *progress: seen.append(progress))  # noqa: B023
         assert seen == [(i + 1, len(seen)) for i in range(len(seen))] and len(seen) > 6

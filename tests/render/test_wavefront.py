@@ -14,6 +14,7 @@ from incpt.core import layout
 from incpt.device.device import Device
 from incpt.render.schedule import scheduled
 from incpt.render.session import Session
+from incpt.render.wavefront import Wavefront
 from incpt.scene.model import Scene
 from incpt.tables.geometry_pool import GeometryPool
 from incpt.tables.scene_tables import SceneTables, tables_of
@@ -29,7 +30,7 @@ def test_a_step_waits_for_one_read(
 ) -> None:
     """That of the film, when all is done; what the lists of paths hold is not waited for by reading it."""
     session = Session(make(), size=(32, 24), device=device)
-    session._wavefront.in_blocks = False
+    session._tracer = Wavefront(device)
     session.step()
     read, count = device.read, []
 
@@ -66,7 +67,7 @@ def test_long_paths_in_media_end(device: Device) -> None:
     images = []
     for in_blocks in (False, True):
         session = Session(mixed_scene(transmission_bounces=40, max_bounces=20), size=(24, 16), device=device)
-        session._wavefront.in_blocks &= in_blocks
+        session._tracer = session._tracer if in_blocks else Wavefront(device)
         session.render(4)
         images.append(session.image())
     np.testing.assert_allclose(images[0].mean(), images[1].mean(), rtol=1e-3)
@@ -78,8 +79,8 @@ def test_work_items_without_a_path_leave_those_of_others_alone(device: Device) -
     images = []
     for chunk_paths in (320, 1 << 12):
         session = Session(mixed_scene(), size=(32, 24), device=device)
-        session._wavefront.in_blocks = False
-        session._wavefront.chunk_paths = chunk_paths
+        session._tracer = wavefront = Wavefront(device)
+        wavefront.chunk_paths = chunk_paths
         session.render(4)
         images.append(session.image())
     np.testing.assert_array_equal(*images)

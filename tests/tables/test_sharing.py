@@ -18,6 +18,7 @@ from incpt.accel import bvh
 from incpt.benchmarks.kit.scenes import icosphere
 from incpt.device.device import Device
 from incpt.render.session import Session
+from incpt.render.wavefront import Wavefront
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
@@ -145,7 +146,7 @@ def test_two_sessions_take_turns(device: Device, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(range_buffer, "_ROOM", 1.0)
     first, second = (Session(with_ball(ball(r), r - 2), device=device) for r in (1.8, 1.9))
     for session in (first, second):
-        session._wavefront.in_blocks &= in_blocks
+        session._tracer = session._tracer if in_blocks else Wavefront(device)
     pool = first._tables.pool
     assert second._tables.pool is pool
     packings = pool.packings
