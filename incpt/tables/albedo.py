@@ -52,7 +52,7 @@ def _visible_normal(
     u: Array,
     v: Array,
 ) -> list[Array]:
-    # Dupuy and Benyoub 2023, as sample_visible_normal in cl/sampling.cl.
+    # Dupuy and Benyoub 2023, as sample_visible_normal in cl/base/sampling.cl.
     x, y, z = alpha * wo[0], alpha * wo[1], wo[2]
     length = np.sqrt(x * x + y * y + z * z)
     x, y, z = x / length, y / length, z / length

@@ -72,7 +72,7 @@ def test_close_up_shows_the_object_alone(name: str) -> None:
 
 
 def _places(slots: npt.NDArray[np.void], width_px: int) -> list[tuple[int, int, int]]:
-    """(x, y, sample) of every place of the path buffer, one by one, as cl/generate.cl reads the slots."""
+    """(x, y, sample) of every place of the path buffer, as cl/path/generate.cl reads the slots."""
     places = []
     for place in range(len(slots) * width_px**2):
         slot = slots[place // width_px**2]

@@ -104,8 +104,8 @@ def test_tile_size_does_not_matter(device: Device, converged: np.ndarray, tile_s
 
 
 def test_paths_go_in_squares_where_they_go_through_trees(device: Device) -> None:
-    """As cl/tile.cl has it; seen by what the path buffer holds of a tile of which a lamp fills the left half,
-    with and without a ball that has a tree of its own."""
+    """As cl/path/tile.cl has it. It is seen by what the path buffer holds of a tile of which a lamp fills the
+    left half, with and without a ball that has a tree of its own."""
     lamp = Object("lamp", shape("plane"), "lamp", (-5, 0, -10), (90, 0, 0), (10, 1, 10))
     behind = Object("ball", shape("sphere"), "grey", (0, 0, 10))
     materials = {"lamp": Material(emission=(1, 1, 1)), "grey": Material()}
