@@ -137,7 +137,7 @@ class PlacedObjects:
     def __init__(self, pool: GeometryPool, meshes: Mapping[Mesh, PooledMesh], table: ObjectTable) -> None:
         self._pool, self._meshes = pool, meshes
         self.table = table
-        self._buffer = pool.device.upload(table.rows)
+        self._buffer = self._uploaded()
 
     @property
     def buffer(self) -> cl.Buffer:
@@ -145,9 +145,14 @@ class PlacedObjects:
         packings = self._pool.packings
         if self.table.packings != packings:
             table = self.table.with_packings(self._meshes, packings)
-            self._buffer = self._pool.device.upload(table.rows)
             self.table = table
+            self._buffer = self._uploaded()
         return self._buffer
+
+    def _uploaded(self) -> cl.Buffer:
+        """The rows, one at least, because kernels read the first one for a ray that meets nothing."""
+        rows = self.table.rows
+        return self._pool.device.upload(rows if len(rows) else np.zeros(1, layout.OBJECT))
 
 
 def _describe(obj: Object, world_vertices: npt.NDArray[np.float32] | None, row: Any) -> None:

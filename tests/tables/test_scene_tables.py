@@ -311,3 +311,10 @@ def test_differences_between_orders(order: list[int], moved: set[int], fewer: in
     assert change.removed == {o.name for o in old} - set(names)
     assert change.moved == {f"{i}" for i in moved} & set(names)
     assert change.reordered == (names != sorted(names))
+
+
+def test_a_scene_without_objects_has_a_row_that_kernels_may_read(device: Device) -> None:
+    """Rays that meet nothing ask the first object for its material, whatever that is."""
+    tables = tables_of(GeometryPool.of(device), scene_of([]))
+    rows = device.read(tables.buffer("objects"), np.ones(1, layout.OBJECT))
+    assert rows["material"][0] == 0 and not rows["visible"][0]
