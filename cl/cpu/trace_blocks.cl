@@ -20,6 +20,9 @@
 #include "path/shade_medium.cl"
 #include "cpu/packets.cl"
 #include "path/shade.cl"
+#ifdef AOVS
+#include "path/write_aovs.cl"
+#endif
 #ifdef BRUTE_FORCE
 #include "cpu/brute_force.cl"
 #endif
@@ -226,8 +229,24 @@ STAGE void shade_surfaces(const Block *block, uint count) {
         shade_path(block->params, &block->shading, &block->state, i, load_result(&block->state, i));
 }
 
+#ifdef AOVS
+// Fills the auxiliary planes of the path buffer for `size` paths from place `first` on, of which `count` have
+// hit something and stand in front.
+STAGE void write_aovs(const Block *block, __global float *path_buffer, uint first, uint size, uint count) {
+    const uint stride = block->params->buffer_stride;
+    for (uint p = SAMPLE_ALBEDO_R; p < SAMPLE_PLANES; p++)
+        for (uint i = 0; i < size; i++)
+            path_buffer[p * stride + first + i] = 0.0f;
+    LANES
+    for (int i = 0; i < (int)count; i++)
+        write_aovs_path(&block->shading, &block->state, i, path_buffer, stride,
+                        first + load_result(&block->state, i));
+}
+#endif
+
 // Takes the paths of a block, from place `first` of the path buffer on, from their start to their end.
-INLINE void trace_block(const Block *block, uint first, uint count) {
+INLINE void trace_block(const Block *block, __global float *path_buffer, uint first, uint size) {
+    uint count = size;
     start_paths(block, first, count);
     for (uint ray = 0; count > 0; ray++) {
         count = trace_rays(block, count, ray == 0);
@@ -237,6 +256,10 @@ INLINE void trace_block(const Block *block, uint first, uint count) {
             shade_misses(block, &ends.misses);
         count = compact_hits(block, &ends);
         setup_surfaces(block, count);
+#ifdef AOVS
+        if (ray == 0)
+            write_aovs(block, path_buffer, first, size, count);
+#endif
 #ifdef MEDIA
         shade_media(block, ends.surfaces.count, count);
 #else
@@ -257,7 +280,7 @@ trace_blocks(FRAME_PARAMETERS, SLOTS_PARAMETERS, BLOCK_PARAMETERS, RADIANCE_PARA
     const Block block = BLOCK_OF(&params, slots);
     const uint first = (uint)get_group_id(0) * BLOCK_PATHS;
     const uint size = first < params.path_count ? MIN(params.path_count - first, BLOCK_PATHS) : 0;
-    trace_block(&block, first, size);
+    trace_block(&block, path_buffer, first, size);
     for (uint c = 0; c < 3; c++)
         for (uint i = 0; i < size; i++)
             path_buffer[c * params.buffer_stride + first + i] = block.state.radiance[c * BLOCK_STRIDE + i];

@@ -133,7 +133,7 @@ PATH_STATE = Group(
         _planes("paths", "PathPlane"),
         _planes("surfaces", "SurfacePlane"),
         _planes("shadows", "ShadowPlane"),
-        _planes("radiance", "what each path of the step has gathered: red, green and blue"),
+        _planes("radiance", "SamplePlane, of which radiance is what each path has gathered so far"),
     ),
 )
 
@@ -161,7 +161,7 @@ BLOCK_MEMORY = Group(
 RADIANCE = Group(
     "RADIANCE",
     None,
-    (Argument("path_buffer", "__global float *", "what each path of the step has gathered, three planes"),),
+    (Argument("path_buffer", "__global float *", "what each path of the step brings: SamplePlane"),),
 )
 
 FIRST_HITS = Group(
@@ -192,6 +192,7 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     "shade_medium": (FRAME, LIST, SHADING, PATH_STATE),
     "shade_miss": (FRAME, LIST, SHADING, EMITTERS, PATH_STATE),
     "trace_shadow": (FRAME, LIST, GEOMETRY, PATH_STATE),
+    "write_aovs": (FRAME, LIST, SHADING, PATH_STATE),
     "trace_blocks": (FRAME, SLOTS, *BLOCK, RADIANCE),
     "first_hits": (FRAME, SHADING, PATH_STATE, FIRST_HITS),
 }

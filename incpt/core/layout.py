@@ -189,6 +189,25 @@ class LightPlane(IntEnum):
     DOUBLE_SIDED = 15
 
 
+class SamplePlane(IntEnum):
+    """Planes of the path buffer: what each path of a step brings, in the order of the passes of a film.
+
+    The planes from ALBEDO_R on are there where the settings ask for auxiliary images. They hold base colour
+    and shading normal (world space) of the first surface, and 0 where the camera ray left the scene. Passes
+    that a strategy asks for have their planes behind those that are there.
+    """
+
+    RADIANCE_R = 0
+    RADIANCE_G = 1
+    RADIANCE_B = 2
+    ALBEDO_R = 3
+    ALBEDO_G = 4
+    ALBEDO_B = 5
+    NORMAL_X = 6
+    NORMAL_Y = 7
+    NORMAL_Z = 8
+
+
 class PathClass(IntFlag):
     """What a path waits for: kernels set the bits, `compact` sorts paths into lists by them."""
 
@@ -482,6 +501,7 @@ def c_header() -> str:
         (PathPlane, "PATH"),
         (ShadowPlane, "SHADOW"),
         (LightPlane, "LIGHT"),
+        (SamplePlane, "SAMPLE"),
         (PathClass, "CLASS"),
         (SlotFlag, "SLOT"),
         (MaterialFlag, "MATERIAL"),

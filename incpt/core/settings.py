@@ -33,6 +33,8 @@ class RenderSettings:
                           "pixel" (the pixel given with the edit: the thesis's choice).
     slots_per_step        tiles that fit one step; None: as many as the image has (the thesis).
     seed                  chooses the random numbers.
+    aovs                  whether base colour and shading normal of what the samples meet first are passes of
+                          the film, beside radiance: see `Session.pass_image`.
     """
 
     size: tuple[int, int] = (960, 540)
@@ -47,6 +49,7 @@ class RenderSettings:
     point_of_change: str = "bounds"
     slots_per_step: int | None = None
     seed: int = 0
+    aovs: bool = False
 
     def __post_init__(self) -> None:
         width, height = _whole_pair(self.size)
@@ -60,6 +63,8 @@ class RenderSettings:
             if name == "slots_per_step" and value is None:
                 continue
             object.__setattr__(self, name, _whole(name, value, low, high))
+        if not isinstance(self.aovs, bool):
+            raise InputError(f"aovs: {self.aovs!r} is not true or false")
         _one_of("strategy", self.strategy, STRATEGIES)
         _one_of("point_of_change", self.point_of_change, POINTS_OF_CHANGE)
 

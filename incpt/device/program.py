@@ -33,6 +33,7 @@ FEATURES = {
     "FLAT": "No mesh has normals of its own.",
     "TOP_LEVEL_ONLY": "Every triangle lies in the packs of the top level, in world space.",
     "BRUTE_FORCE": "The triangles of the top level are so few that blocks test them without a tree.",
+    "AOVS": "Paths write base colour and normal of the first surface into the path buffer.",
     "EMISSION_ONLY": "No path goes on after this ray, so that surfaces only emit.",
     "COUNT_VISITS": "Traversal counts the nodes and packs that it tests, for the benchmark of rays.",
     "MIS_ONLY_LIGHT": "Light sampling alone brings light, where it can, for the tests of its weights.",

@@ -36,13 +36,14 @@ class BlockTracer:
         params: npt.NDArray[np.void],
         slots: cl.Buffer,
         path_count: int,
-        radiance: cl.Buffer,
+        path_buffer: cl.Buffer,
+        aovs: bool = False,
     ) -> None:
         """See `tracer.Tracer`. No path at all builds the kernel."""
         whole = scheduled(params, scene)
         whole["path_count"] = path_count
-        kernel = self.device.kernel("trace_blocks", features=scene.variant)
-        values = {"params": whole, "slots": slots, "path_buffer": radiance}
+        kernel = self.device.kernel("trace_blocks", features=(*scene.variant, *(("AOVS",) if aovs else ())))
+        values = {"params": whole, "slots": slots, "path_buffer": path_buffer}
         launch(self.device, kernel, bindings.KERNELS["trace_blocks"], path_count, values, scene)
 
     def first_hits(
@@ -59,11 +60,16 @@ class BlockTracer:
         self._wavefront.first_hits(scene, params, slots, path_count, surface, object_ids, radiance)
 
     def idle_launches(
-        self, scene: SceneTables, params: npt.NDArray[np.void], slots: cl.Buffer, radiance: cl.Buffer
+        self,
+        scene: SceneTables,
+        params: npt.NDArray[np.void],
+        slots: cl.Buffer,
+        path_buffer: cl.Buffer,
+        aovs: bool = False,
     ) -> list[Callable[[], None]]:
         """See `tracer.Tracer`. A work-item is a block of paths, so that grids are small always."""
-        first_hits = self._wavefront.idle_first_hits(scene, params, slots, radiance)
-        return [*first_hits, partial(self.trace, scene, params, slots, 0, radiance)]
+        first_hits = self._wavefront.idle_first_hits(scene, params, slots, path_buffer)
+        return [*first_hits, partial(self.trace, scene, params, slots, 0, path_buffer, aovs)]
 
 
 def launch(

@@ -1,6 +1,7 @@
 """The film: what the paths brought, added up over the picture, with the number of samples behind each pixel.
 
-A film has named passes; radiance is one of them. Each holds sums, which `resolve` divides by the number of
+A film has named passes; radiance is one of them, and auxiliary images (albedo, normal) of the same jittered
+samples may be others. Each holds sums, which `resolve` divides by the number of
 samples, so that tiles may differ in it. A finished tile either replaces what a pass has of it or is added;
 one that is under way waits in `pending`, so that nobody sees half of it.
 """
@@ -57,6 +58,18 @@ class FilmPass:
 
 RADIANCE = FilmPass("radiance", 3)
 """Red, green and blue, as `Session.image` shows them."""
+ALBEDO = FilmPass("albedo", 3)
+"""Base colour of the first surface, 0 where there is none: the mean over the samples is antialiased."""
+NORMAL = FilmPass("normal", 3)
+"""Shading normal of the first surface in world space, 0 where there is none. It points to the outside of the
+face, from whichever side the ray comes. Means are shorter than 1 where the samples of a pixel differ."""
+AOVS = (ALBEDO, NORMAL)
+"""Auxiliary images, as denoisers expect them: means over the samples of the picture. They lie in the path
+buffer as layout.SamplePlane says.
+
+Distance and object are not among them, because their mean over an outline means nothing: a distance at which
+nothing is, a number between those of two objects. `first_hits` finds them along rays through pixel centres.
+"""
 
 
 def plane_count(passes: Sequence[FilmPass]) -> int:
@@ -96,6 +109,10 @@ class Film:
         first_slots = self.device.upload(groups)
         for layer in self._layers.values():
             layer.reduce(size, params, np.uint32(len(groups)), first_slots, slots, samples, self._nonfinite)
+
+    def first_plane(self, name: str) -> int:
+        """Where the planes of a pass begin in the path buffer."""
+        return int(self._layers[name].first_plane)
 
     def take_nonfinite(self) -> int:
         """Samples that were not finite since the last call; they count as black."""
@@ -144,7 +161,7 @@ class _Layer:
     buffer."""
 
     def __init__(self, device: Device, film_pass: FilmPass, first_plane: int, pixels: int) -> None:
-        self.device, self.film_pass, self._first_plane = device, film_pass, np.uint32(first_plane)
+        self.device, self.film_pass, self.first_plane = device, film_pass, np.uint32(first_plane)
         nbytes = 4 * (film_pass.channels + 1) * pixels
         self.sums, self._pending, self.image = (device.empty(nbytes) for _ in range(3))
         device.fill(self.sums, 0, nbytes)
@@ -162,7 +179,7 @@ class _Layer:
         """Launch cl/film/reduce.cl over `size` work-items."""
         self._launch(
             "reduce", self.film_pass.accumulation.value, size, params, group_total, groups, slots, samples,
-            self._first_plane, self._pending, self.sums, nonfinite,
+            self.first_plane, self._pending, self.sums, nonfinite,
         )  # fmt: skip
 
     def resolve(self, size: int, pixels: np.uint32) -> None:

@@ -12,7 +12,7 @@ from incpt.core.errors import DeviceError, InputError
 from incpt.core.settings import RenderSettings
 from incpt.device.device import Device
 from incpt.render.film import plane_count
-from incpt.render.strategies import strategy_of
+from incpt.render.strategies import passes_of
 from incpt.render.tiles import TileGrid
 
 _MOST_FLOATS = 1 << 32
@@ -75,7 +75,7 @@ def check_settings(settings: RenderSettings) -> None:
 
 
 def _planes(settings: RenderSettings) -> int:
-    return plane_count(strategy_of(settings).passes)
+    return plane_count(passes_of(settings))
 
 
 def _stride(slots: int, tile_size: int) -> int:

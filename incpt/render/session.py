@@ -18,14 +18,14 @@ from incpt.core.errors import InputError
 from incpt.core.settings import RenderSettings
 from incpt.device.device import Device
 from incpt.render import first_hits, tiles
-from incpt.render.film import Film, tile_image
+from incpt.render.film import RADIANCE, Film, tile_image
 from incpt.render.first_hits import Aovs
 from incpt.render.modes import Mode
 from incpt.render.params import launch_params
 from incpt.render.path_buffer import PathBuffer, slots_of
 from incpt.render.plan import Cursor, Queue
 from incpt.render.progress import Progress
-from incpt.render.strategies import TracedStep, strategy_of
+from incpt.render.strategies import TracedStep, passes_of, strategy_of
 from incpt.render.tracer import tracer_of
 from incpt.scene.change import Change, diff
 from incpt.scene.model import Scene
@@ -148,7 +148,7 @@ class Session:
         params = self._params(path_buffer)
         filled = self.device.upload(plan.slots)
         paths = len(plan.slots) * settings.tile_size**2
-        self._tracer.trace(self._tables, params, filled, paths, path_buffer.floats)
+        self._tracer.trace(self._tables, params, filled, paths, path_buffer.floats, settings.aovs)
         traced = TracedStep(self._tracer, self._tables, params, plan, filled, path_buffer.floats)
         strategy_of(settings).merge(traced, film)
         nonfinite = film.take_nonfinite()
@@ -223,13 +223,27 @@ class Session:
         image = strategy_of(self.settings).image(self._state.film)
         return image if alpha else np.ascontiguousarray(image[..., :3])
 
+    def pass_image(self, name: str) -> npt.NDArray[np.float32]:
+        """(H, W, channels) the picture of a pass of the film: "radiance" is `image`. With the setting `aovs`,
+        "albedo" and "normal" (H, W, 3) are the mean base colour and the mean shading normal (world space) of
+        what the samples of the picture met first, 0 for those that met nothing. Distance and object have no
+        mean: see `aovs`. Raises InputError for a pass that there is not."""
+        passes = {one.name: one for one in self._state.film.passes}
+        if name not in passes:
+            hint = "" if self.settings.aovs else "; the setting aovs adds albedo and normal"
+            raise InputError(f"pass {name!r}: is not in the film; choose one of {', '.join(passes)}{hint}")
+        if name == RADIANCE.name:
+            return self.image()
+        return np.ascontiguousarray(self._state.film.image(name)[..., :-1])
+
     def spp(self) -> npt.NDArray[np.int64]:
         """(H, W) samples behind each pixel; 0 where the old picture waits to be thrown away."""
         return tile_image(self.grid, self.tile_spp)
 
     def aovs(self, size: tuple[int, int] | None = None, rows: tuple[int, int] | None = None) -> Aovs:
-        """Auxiliary images of the scene as it is now, of the session's size or another; see Aovs. `rows`:
-        from the first of them up to the second only."""
+        """Auxiliary images of the scene as it is now along rays through pixel centres, of the session's size
+        or another; see Aovs. `rows`: from the first of them up to the second only. Those of the samples of
+        the picture are passes of the film; see `pass_image`."""
         size = self.size if size is None else size
         return first_hits.first_hits(self._tracer, self._tables, self.settings, size, rows)
 
@@ -250,13 +264,14 @@ class Session:
         """Build every kernel that the scene as it is now needs, so that no later call has to wait for one.
         `on_progress` is called with how many of how many steps are done; not at all if nothing is to do.
         What it raises ends the building, which may go on later."""
-        kernels = self._tables.variant
+        aovs = self.settings.aovs
+        kernels = (*self._tables.variant, *(("AOVS",) if aovs else ()))
         if kernels in self.device.built:
             return
         film, path_buffer = self._state.film, self._state.path_buffer
         params, slots = self._params(path_buffer), self.device.upload(first_hits.one_slot())
         steps = [
-            *self._tracer.idle_launches(self._tables, params, slots, path_buffer.floats),
+            *self._tracer.idle_launches(self._tables, params, slots, path_buffer.floats, aovs),
             *film.idle_launches(params, path_buffer.floats),
         ]
         for done, step in enumerate(steps, 1):
@@ -282,7 +297,7 @@ class Session:
         path_buffer = PathBuffer.of_settings(
             self.device, settings, state.path_buffer if keeps_memory else None
         )
-        passes = strategy_of(settings).passes
+        passes = passes_of(settings)
         if (old.size, old.tile_size, state.film.passes) != (settings.size, settings.tile_size, passes):
             film = _new_film(self.device, settings)
             return SessionState(Progress.start(settings, self.scene, film), film, path_buffer, state.tables)
@@ -296,4 +311,4 @@ class Session:
 
 
 def _new_film(device: Device, settings: RenderSettings) -> Film:
-    return Film(device, *settings.size, strategy_of(settings).passes)
+    return Film(device, *settings.size, passes_of(settings))

@@ -29,7 +29,7 @@ import pyopencl as cl
 from incpt.core import affine
 from incpt.core.settings import RenderSettings
 from incpt.render import tiles
-from incpt.render.film import RADIANCE, Film, FilmPass, Float32Array
+from incpt.render.film import AOVS, RADIANCE, Film, FilmPass, Float32Array
 from incpt.render.modes import Mode
 from incpt.render.plan import CountArray, Plan, Queue
 from incpt.render.tiles import IntArray, TileGrid
@@ -84,7 +84,7 @@ class TracedStep:
     plan     which tile and sample is in which slot.
     slots    the slots of the plan, on the device.
     samples  the path buffer: what the paths brought, a plane for each channel of each pass of the film.
-             The tracer fills those of radiance.
+             The tracer fills those of radiance and of auxiliary images.
     """
 
     tracer: Tracer
@@ -99,13 +99,13 @@ class Strategy(ABC):
     """What happens to the picture after a change; see the module for the three jobs.
 
     name           by which settings choose it.
-    passes         what the film has to hold for it; radiance is the first of them.
+    passes         what the film has to hold for it, beside radiance and auxiliary images.
     uses_nor       whether the setting `nor` makes a difference.
     keeps_picture  whether a local change keeps what the film has; see `modes.next_mode`.
     """
 
     name: ClassVar[str]
-    passes: ClassVar[tuple[FilmPass, ...]] = (RADIANCE,)
+    passes: ClassVar[tuple[FilmPass, ...]] = ()
     uses_nor: ClassVar[bool]
     keeps_picture: ClassVar[bool]
 
@@ -129,7 +129,8 @@ class Strategy(ABC):
     def merge(self, step: TracedStep, film: Film) -> None:
         """Job 3: put what a step traced into the film. It may launch kernels of its own over all that the
         step and the film hold, such as paths in an older scene from the same slots, whose results go into
-        passes of its own. By default each pass gets its planes of the path buffer."""
+        passes of its own; `Film.first_plane` tells where their planes begin. By default each pass gets its
+        planes of the path buffer."""
         film.reduce(step.params, step.plan, step.slots, step.samples)
 
     def image(self, film: Film) -> Float32Array:
@@ -185,6 +186,12 @@ STRATEGIES_BY_NAME: dict[str, Strategy] = {strategy.name: strategy for strategy 
 def strategy_of(settings: RenderSettings) -> Strategy:
     """The strategy that settings choose."""
     return STRATEGIES_BY_NAME[settings.strategy]
+
+
+def passes_of(settings: RenderSettings) -> tuple[FilmPass, ...]:
+    """What the film of a session with these settings holds, in the order of the planes of the path buffer:
+    radiance, auxiliary images where they are asked for, and what the strategy needs."""
+    return (RADIANCE, *(AOVS if settings.aovs else ()), *strategy_of(settings).passes)
 
 
 def point_of_change(

@@ -27,10 +27,12 @@ class Tracer(Protocol):
         params: npt.NDArray[np.void],
         slots: cl.Buffer,
         path_count: int,
-        radiance: cl.Buffer,
+        path_buffer: cl.Buffer,
+        aovs: bool = False,
     ) -> None:
-        """Trace `path_count` paths, those of `slots` in order; `radiance` gets what each brings, as three
-        planes of params["buffer_stride"] floats."""
+        """Trace `path_count` paths, those of `slots` in order; `path_buffer` gets what each brings, as planes
+        of params["buffer_stride"] floats: those of radiance in layout.SamplePlane, with `aovs` all of
+        them."""
 
     def first_hits(
         self,
@@ -45,7 +47,12 @@ class Tracer(Protocol):
         """What camera rays meet: `surface` and `object_ids` as cl/film/first_hits.cl fills them."""
 
     def idle_launches(
-        self, tables: SceneTables, params: npt.NDArray[np.void], slots: cl.Buffer, radiance: cl.Buffer
+        self,
+        tables: SceneTables,
+        params: npt.NDArray[np.void],
+        slots: cl.Buffer,
+        path_buffer: cl.Buffer,
+        aovs: bool = False,
     ) -> list[Callable[[], None]]:
         """A launch of every kernel that `trace` and `first_hits` may need for these tables, each with nothing
         to do; see `Device.built`. `slots` holds one slot, which lanes without a path read."""

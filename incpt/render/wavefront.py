@@ -6,6 +6,8 @@ in SIMD lanes. Paths are traced in chunks whose state fits the caches of a CPU.
 
     generate -> [ intersect -> shade_miss, sample_lights, shade_medium, shade -> trace_shadow ] once a ray
 
+Where auxiliary images are asked for, `write_aovs` follows the first `intersect`.
+
 The lengths of the lists stay on the device. The host launches each stage over a bound of its list, and learns
 how many paths are left of a ray while the device is at work on a later one; work-items beyond the list have
 nothing to do.
@@ -52,11 +54,13 @@ _NEW_LISTS = 3
 
 @dataclass(frozen=True)
 class _Chunk:
-    """Paths that are traced together: in which scene, by which settings, and where they gather."""
+    """Paths that are traced together: in which scene, by which settings, where they leave what they bring,
+    and whether auxiliary images are part of it."""
 
     scene: SceneTables
     params: npt.NDArray[np.void]
-    radiance: cl.Buffer
+    path_buffer: cl.Buffer
+    aovs: bool = False
 
     @property
     def size(self) -> int:
@@ -88,11 +92,11 @@ class Wavefront:
         params: npt.NDArray[np.void],
         slots: cl.Buffer,
         path_count: int,
-        radiance: cl.Buffer,
+        path_buffer: cl.Buffer,
+        aovs: bool = False,
     ) -> None:
-        """Trace `path_count` paths, those of `slots` in order; `radiance` holds what each brings, as three
-        planes of params["buffer_stride"] floats."""
-        for chunk in self._chunks(scene, params, path_count, radiance):
+        """See `tracer.Tracer`."""
+        for chunk in self._chunks(scene, params, path_count, path_buffer, aovs):
             self._trace_chunk(chunk, slots)
 
     def first_hits(
@@ -112,11 +116,16 @@ class Wavefront:
             self._first_hits(chunk, surface, object_ids)
 
     def idle_launches(
-        self, scene: SceneTables, params: npt.NDArray[np.void], slots: cl.Buffer, radiance: cl.Buffer
+        self,
+        scene: SceneTables,
+        params: npt.NDArray[np.void],
+        slots: cl.Buffer,
+        path_buffer: cl.Buffer,
+        aovs: bool = False,
     ) -> list[Callable[[], None]]:
         """A launch of every kernel that `trace` and `first_hits` may need for this scene, each with nothing
         to do; see `Device.built`. `slots` holds one slot, which lanes without a path read."""
-        chunk = self._chunk(scene, params, 0, 0, radiance)
+        chunk = self._chunk(scene, params, 0, 0, path_buffer)
         stages: list[Callable[[], object]] = [
             partial(self._sample_lights, chunk, 0, 0, PathList.SURFACE),
             partial(self._shade, chunk, 0, 0),
@@ -127,7 +136,9 @@ class Wavefront:
             stages.append(partial(self._shade_media, chunk, 0, 0))
         else:
             stages.append(partial(self._shade, chunk, 0, 0, last=True))
-        return [*self.idle_first_hits(scene, params, slots, radiance), *self._idle(stages)]
+        if aovs:
+            stages.append(partial(self._write_aovs, chunk, 0))
+        return [*self.idle_first_hits(scene, params, slots, path_buffer), *self._idle(stages)]
 
     def idle_first_hits(
         self, scene: SceneTables, params: npt.NDArray[np.void], slots: cl.Buffer, radiance: cl.Buffer
@@ -155,19 +166,30 @@ class Wavefront:
             self._least_size = 1
 
     def _chunks(
-        self, scene: SceneTables, params: npt.NDArray[np.void], path_count: int, radiance: cl.Buffer
+        self,
+        scene: SceneTables,
+        params: npt.NDArray[np.void],
+        path_count: int,
+        path_buffer: cl.Buffer,
+        aovs: bool = False,
     ) -> list[_Chunk]:
         return [
-            self._chunk(scene, params, first, min(self.chunk_paths, path_count - first), radiance)
+            self._chunk(scene, params, first, min(self.chunk_paths, path_count - first), path_buffer, aovs)
             for first in range(0, path_count, self.chunk_paths)
         ]
 
     def _chunk(
-        self, scene: SceneTables, params: npt.NDArray[np.void], first: int, size: int, radiance: cl.Buffer
+        self,
+        scene: SceneTables,
+        params: npt.NDArray[np.void],
+        first: int,
+        size: int,
+        path_buffer: cl.Buffer,
+        aovs: bool = False,
     ) -> _Chunk:
         own = scheduled(params, scene)
         own["first_path"], own["path_count"], own["path_stride"] = first, size, self.stride
-        return _Chunk(scene, own, radiance)
+        return _Chunk(scene, own, path_buffer, aovs)
 
     def _trace_chunk(self, chunk: _Chunk, slots: cl.Buffer) -> None:
         self._generate(chunk, slots)
@@ -189,6 +211,8 @@ class Wavefront:
         """Ray number `ray` of every live path, which are `bound` at most."""
         last = ray == int(chunk.params["last_ray"])
         self._intersect(chunk, ray, bound)
+        if chunk.aovs and ray == 0:
+            self._write_aovs(chunk, bound)
         listed = [(path_list, ray) for path_list in (PathList.SURFACE, PathList.MISS, PathList.MEDIUM)]
         self._compact(chunk, ray, bound, PathList.LIVE, *listed)
         if chunk.params["sees_sky"]:
@@ -211,6 +235,9 @@ class Wavefront:
 
     def _intersect(self, chunk: _Chunk, ray: int, bound: int) -> None:
         self._launch_listed("intersect", chunk, ray, bound, PathList.LIVE)
+
+    def _write_aovs(self, chunk: _Chunk, bound: int) -> None:
+        self._launch_listed("write_aovs", chunk, 0, bound, PathList.LIVE)
 
     def _shade_misses(self, chunk: _Chunk, ray: int, bound: int) -> None:
         features = (*chunk.scene.features, *(("MEDIA",) if chunk.scene.has_media else ()))
@@ -279,7 +306,7 @@ class Wavefront:
     ) -> None:
         """Launch a kernel; its arguments are `values` by name, the planes of paths, and the buffers of the
         scene."""
-        known = {**self._planes, "params": chunk.params, "radiance": chunk.radiance, **values}
+        known = {**self._planes, "params": chunk.params, "radiance": chunk.path_buffer, **values}
         arguments = bindings.arguments(bindings.KERNELS[name], known, chunk.scene)
         kernel = self.device.kernel(name, features=features)
         self.device.launch(kernel, max(size, self._least_size), *arguments)

@@ -14,7 +14,7 @@ from incpt.core.bindings import BLOCK, KERNELS, Argument, Group
 from incpt.device import program
 from incpt.device.device import Device
 
-FEATURES = {"sample_lights": ("TRIANGLE_LIGHTS",), "trace_blocks": ("TRIANGLE_LIGHTS", "MEDIA")}
+FEATURES = {"sample_lights": ("TRIANGLE_LIGHTS",), "trace_blocks": ("TRIANGLE_LIGHTS", "MEDIA", "AOVS")}
 
 
 def declared(device: Device, name: str) -> list[tuple[str, str]]:

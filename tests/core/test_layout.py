@@ -59,6 +59,7 @@ def test_constants_and_planes_are_in_the_header() -> None:
         layout.RawHitPlane,
         layout.SurfacePlane,
         layout.PathPlane,
+        layout.SamplePlane,
         layout.ShadowPlane,
         layout.LightPlane,
         layout.PathList,

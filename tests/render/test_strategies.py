@@ -11,7 +11,7 @@ from support.small_scenes import mixed_scene
 
 from incpt.core.settings import STRATEGIES, RenderSettings
 from incpt.device.device import Device
-from incpt.render.film import RADIANCE, Film, FilmPass, Resolution
+from incpt.render.film import Film, FilmPass, Resolution
 from incpt.render.modes import Mode
 from incpt.render.plan import CountArray
 from incpt.render.session import Session
@@ -93,7 +93,7 @@ class Probe(Strategy):
     name = "probe"
     uses_nor = True
     keeps_picture = True
-    passes = (RADIANCE, TRACES)
+    passes = (TRACES,)
 
     def order(self, situation: Situation) -> IntArray:
         order = base_queue(situation.grid)
@@ -108,16 +108,19 @@ class Probe(Strategy):
 
     def merge(self, step: TracedStep, film: Film) -> None:
         device, stride = film.device, int(step.params["buffer_stride"])
-        device.write(step.samples, np.full(stride, 2.0, np.float32), offset=4 * 3 * stride)
+        device.write(
+            step.samples, np.full(stride, 2.0, np.float32), offset=4 * film.first_plane("traces") * stride
+        )
         super().merge(step, film)
 
 
+@pytest.mark.parametrize("aovs", [False, True])
 def test_session_takes_a_strategy_with_needs_of_its_own(
-    device: Device, monkeypatch: pytest.MonkeyPatch
+    device: Device, monkeypatch: pytest.MonkeyPatch, aovs: bool
 ) -> None:
     monkeypatch.setitem(STRATEGIES_BY_NAME, "probe", Probe())
     monkeypatch.setattr("incpt.core.settings.STRATEGIES", (*STRATEGIES, "probe"))
-    scene = mixed_scene(strategy="probe", slots_per_step=7)
+    scene = mixed_scene(strategy="probe", slots_per_step=7, aovs=aovs)
     session = Session(scene, device=device)
     session.render(2)
     order = base_queue(session.grid)
@@ -146,6 +149,6 @@ def test_session_takes_a_strategy_with_needs_of_its_own(
         assert here.any()
         np.testing.assert_allclose(session.image()[here], fresh.image()[here], rtol=1e-3, atol=1e-4)
     # A strategy without that pass starts a film without it.
-    session.configure(replace(session.settings, strategy="restart"))
+    session.configure(replace(session.settings, strategy="restart", aovs=False))
     assert session.mode is Mode.BASE and list(session._state.film.sums()) == ["radiance"]
     assert session._state.path_buffer.planes == 3
