@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -36,7 +37,12 @@ def render(
     strategy: Annotated[str | None, typer.Option(help=f"{' or '.join(STRATEGIES)}.")] = None,
     max_bounces: BouncesOption = None,
     aovs: Annotated[
-        bool, typer.Option("--aovs", help="Put object ids, normals, depth and base colours into the .exr.")
+        bool,
+        typer.Option(
+            "--aovs",
+            help="Add base colours and normals (means over the samples), depth and object ids (at pixel "
+            "centres) to the .exr.",
+        ),
     ] = False,
     device: DeviceOption = None,
 ) -> None:
@@ -46,6 +52,8 @@ def render(
         raise InputError(f"--aovs: {output} cannot hold them; use an .exr")
     scene = registry.load(scene_file)
     settings = settings_from(scene, size=size, seed=seed, strategy=strategy, max_bounces=max_bounces)
+    if aovs:
+        settings = replace(settings, aovs=True)
     session = Session(scene, settings=settings, device=device)
     pixels = padded_pixels(settings)
     nonfinite = 0
@@ -63,7 +71,7 @@ def render(
             if not stop.requested:
                 raise
         # Still inside, so that another Ctrl-C does not tear the picture that is kept.
-        write_picture(output, session, aovs)
+        write_picture(output, session, settings.aovs)
     samples = int(session.spp().min())
     if nonfinite:
         complain(f"warning: {nonfinite:,} samples were not finite and count as black", 0)

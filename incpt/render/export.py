@@ -15,9 +15,13 @@ SUFFIXES = (".exr", ".png")
 def write_picture(
     path: Path, session: Session, with_aovs: bool = False, exposure: float = 0.0, curve: str = "agx"
 ) -> None:
-    """Write the picture as it is now: .exr holds linear radiance and, `with_aovs`, the first-hit images as
+    """Write the picture as it is now: .exr holds linear radiance and, `with_aovs`, auxiliary images as
     layers; .png is tone-mapped (see `tone_mapping.tone_map`). Raises InputError for another suffix, and
-    OutputError where the file cannot be written."""
+    OutputError where the file cannot be written.
+
+    Distance and object ids are those of rays through pixel centres. Base colours and normals are means over
+    the samples of the picture where the session has the setting `aovs`, else of the same rays.
+    """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise InputError(f"{path}: ends in no known format; use .exr or .png")
@@ -28,6 +32,8 @@ def write_picture(
     if with_aovs:
         aovs = session.aovs()
         # Object ids are unsigned in OpenEXR; the largest one stands for "none".
-        layers |= {"albedo.RGB": aovs.albedo, "normal.XYZ": aovs.normal, "depth.Z": aovs.depth}
-        layers["object_id"] = aovs.object_id.view("uint32")
+        layers |= {"depth.Z": aovs.depth, "object_id": aovs.object_id.view("uint32")}
+        has_passes = session.settings.aovs
+        layers["albedo.RGB"] = session.pass_image("albedo") if has_passes else aovs.albedo
+        layers["normal.XYZ"] = session.pass_image("normal") if has_passes else aovs.normal
     images.write_exr(path, layers)

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import types
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from incpt.cli.console import PathProgress, interruption, path_progress
 from incpt.cli.main import main
 from incpt.core.errors import DeviceError, OutputError
 from incpt.device.device import all_devices
-from incpt.formats import registry
+from incpt.formats import registry, scene_save
 from incpt.render.session import Session, StepReport
 
 SCENE = """
@@ -70,18 +71,34 @@ def test_render_puts_aovs_into_an_exr(
     scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run("render", scene_file, "-o", tmp_path / "a.exr", "--spp", 1, "--aovs") == 0
-    channels = OpenEXR.File(str(tmp_path / "a.exr")).channels()
-    expected = Session(registry.load(scene_file)).aovs()
+    channels = OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True).channels()
+    scene = registry.load(scene_file)
+    session = Session(scene, settings=replace(scene.settings, aovs=True))
+    session.render(1)
+    expected = session.aovs()
     ids = np.asarray(channels["object_id"].pixels)
     np.testing.assert_array_equal(ids.view(np.int32), expected.object_id)
     assert set(np.unique(ids)) == {0, 0xFFFFFFFF}
     np.testing.assert_array_equal(np.asarray(channels["depth.Z"].pixels), expected.depth)
-    for axis, name in enumerate("XYZ"):
-        plane = np.asarray(channels[f"normal.{name}"].pixels)
-        np.testing.assert_array_equal(plane, expected.normal[..., axis])
+    # Base colours and normals are those of the samples, which differ from pixel centres along outlines.
+    for layer, axes in (("albedo", "RGB"), ("normal", "XYZ")):
+        planes = [np.asarray(channels[f"{layer}.{axis}"].pixels) for axis in axes]
+        np.testing.assert_array_equal(np.stack(planes, axis=2), session.pass_image(layer))
+    assert (session.pass_image("normal") != expected.normal).any()
     capsys.readouterr()
     assert run("render", scene_file, "-o", tmp_path / "a.png", "--aovs") == 2
     assert "--aovs: " in capsys.readouterr().err and not (tmp_path / "a.png").exists()
+
+
+@pytest.mark.slow
+def test_a_scene_that_asks_for_aovs_needs_no_option(scene_file: Path, tmp_path: Path) -> None:
+    scene = registry.load(scene_file)
+    scene_save.save(replace(scene, settings=replace(scene.settings, aovs=True)), tmp_path / "b.toml")
+    for file, has_layers in ((tmp_path / "b.toml", True), (scene_file, False)):
+        assert run("render", file, "-o", tmp_path / "a.exr", "--spp", 1) == 0
+        layers = OpenEXR.File(str(tmp_path / "a.exr")).channels()
+        assert ({"albedo", "normal.X", "depth.Z", "object_id"} <= set(layers)) == has_layers
+    assert run("render", tmp_path / "b.toml", "-o", tmp_path / "a.png", "--spp", 1) == 0
 
 
 def test_render_writes_what_the_session_renders(scene_file: Path, tmp_path: Path) -> None:
