@@ -21,7 +21,7 @@
 
 // Without AVX-512 clang warns that float16 is passed to functions in another way than with it. That does no
 // harm, because nothing is passed to other programs.
-#ifdef __clang__
+#ifdef CLANG_CPU
 #pragma clang diagnostic ignored "-Wpsabi"
 #endif
 

@@ -21,6 +21,9 @@ from incpt.device import pocl, program
 
 DEVICE_VARIABLE = "INCPT_DEVICE"
 
+_SCALARS = (np.generic, np.ndarray)
+"""Arguments of kernels that are passed by value: numbers, and structs as arrays without a dimension."""
+
 
 BUILD_SIZES = (1, 1 << 17)
 """Work-items of the launches after which a kernel is built to the end: PoCL translates one to machine code
@@ -61,6 +64,7 @@ class Device:
                 f"device {self.name!r} cannot be opened: {error}; try another --device"
             ) from error
         self._kernels: dict[tuple[str, tuple[str, ...]], cl.Kernel] = {}
+        self._typed: set[cl.Kernel] = set()
         self.built: set[tuple[str, ...]] = set()
         """The variants of the kernels that were built as a whole; see `SceneTables.variant`."""
 
@@ -108,8 +112,13 @@ class Device:
         return self._kernels[name, features]
 
     def launch(self, kernel: cl.Kernel, size: int, *args: Any, work_group: int | None = None) -> cl.Event:
-        """Enqueue `size` work-items, rounded up to whole groups; args are buffers and numpy scalars."""
+        """Enqueue `size` work-items, rounded up to whole groups; args are buffers and numpy scalars, whose types
+        are the same in every launch of a kernel."""
         group = work_group or self.tuning.work_group
+        if kernel not in self._typed:
+            # pyopencl then packs arguments without looking at each: microseconds instead of some ten of them.
+            kernel.set_scalar_arg_dtypes([arg.dtype if isinstance(arg, _SCALARS) else None for arg in args])
+            self._typed.add(kernel)
         try:
             return kernel(self.queue, (-(-size // group) * group,), (group,), *args)
         except cl.Error as error:
@@ -203,7 +212,7 @@ class Device:
                 return built
         except cl.Error as error:
             raise DeviceError(
-                f"{what} does not build on {self.name}: {program.first_error(str(error))}"
+                f"{what} does not build on {self.name}: {program.first_error(str(error), text)}"
             ) from error
 
 

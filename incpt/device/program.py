@@ -18,6 +18,9 @@ from incpt.core import arena, bindings, layout
 BUILD_OPTIONS = ("-cl-std=CL1.2", "-cl-mad-enable", "-cl-no-signed-zeros")
 """Options of every build."""
 
+_LINE = re.compile(r'#line (\d+) "(.*)"$')
+_WHOLE_TEXT = re.compile(r"<kernel>:(\d+):")
+"""How NVIDIA's compiler, which passes over #line, gives a place in the whole text."""
 _INCLUDE = re.compile(r'^#include "([\w/]+)\.cl"$', re.MULTILINE)
 
 
@@ -96,12 +99,22 @@ def files() -> dict[str, str]:
     return found
 
 
-def first_error(log: str) -> str:
-    """The first error that a compiler tells of."""
+def first_error(log: str, text: str) -> str:
+    """The first error that a compiler tells of, with the place in cl/ that it stands at; `text` is what was
+    compiled."""
     for line in log.splitlines():
         if "error:" in line:
-            return line.strip()
+            return _WHOLE_TEXT.sub(lambda match: _place(text, int(match[1])), line.strip())
     return log.strip().splitlines()[0]
+
+
+def _place(text: str, number: int) -> str:
+    """File and line, with a colon after each, of a line of the whole text."""
+    file, first, at = "kernel", 1, 0
+    for i, line in enumerate(text.splitlines()[: number - 1], 1):
+        if marker := _LINE.match(line):
+            file, first, at = marker[2], int(marker[1]), i
+    return f"{file}:{first + number - at - 1}:"
 
 
 def _below(folder: Traversable, prefix: str) -> Iterator[str]:

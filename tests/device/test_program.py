@@ -47,3 +47,14 @@ def test_features_of_a_device_are_part_of_all_its_programs(device: Device) -> No
     own = Device(features=("MIS_ONLY_BSDF",))
     assert "#define MIS_ONLY_BSDF\n" in own.program_text("shade")
     assert "#define MIS_ONLY_BSDF\n" not in device.program_text("shade")
+
+
+def test_places_in_the_whole_text_become_places_in_files(device: Device) -> None:
+    """NVIDIA's compiler counts lines of the whole text, whatever #line says."""
+    text = device.program_text("shade")
+    for path, words in (("path/shade", "__kernel void shade("), ("base/scalar", "INLINE Vec3 vec3(")):
+        number = next(i for i, line in enumerate(text.splitlines(), 1) if words in line)
+        own = next(i for i, line in enumerate(source_of(path).splitlines(), 1) if words in line)
+        log = f"1 error generated.\n<kernel>:{number}:9: error: no such thing\n"
+        assert program.first_error(log, text) == f"{path}.cl:{own}:9: error: no such thing"
+    assert program.first_error("out of registers", text) == "out of registers"
