@@ -112,8 +112,8 @@ class Device:
         return self._kernels[name, features]
 
     def launch(self, kernel: cl.Kernel, size: int, *args: Any, work_group: int | None = None) -> cl.Event:
-        """Enqueue `size` work-items, rounded up to whole groups; args are buffers and numpy scalars, whose types
-        are the same in every launch of a kernel."""
+        """Enqueue `size` work-items, rounded up to whole groups. `args` are buffers and numpy scalars, of the
+        same types in every launch of a kernel."""
         group = work_group or self.tuning.work_group
         if kernel not in self._typed:
             # pyopencl then packs arguments without looking at each: microseconds instead of some ten of them.
