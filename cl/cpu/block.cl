@@ -69,6 +69,12 @@ INLINE void store_raw_hit(const Block *block, uint path, const RawHit *hit) {
         hits[(RAW_HIT_WEIGHT_A + i) * BLOCK_STRIDE + path] = hit->weight[i];
 }
 
+// Traversals that keep the top level and the tree of an object on one stack: its size, with room for a whole
+// node more, because all its children are written and the stack then grows by those that are met.
+#define ONE_STACK_SIZE (BVH_TOP_STACK_SIZE + BVH_STACK_SIZE + 1 + BVH_WIDTH)
+// Stands on that stack below the tree of an object: rays leave the space of the object there.
+#define LEAVE_OBJECT NODE_EMPTY
+
 // How far traversal of trees looks for the hit of a path. Brute force has left its nearest hit before.
 INLINE float nearest_limit(const Block *block, uint path) {
 #ifdef BRUTE_FORCE

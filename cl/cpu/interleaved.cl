@@ -23,11 +23,6 @@
 #else
 #define INTERLEAVED_RAYS 16
 #endif
-// There is room for a whole node more, because all its children are written and the stack then grows by those
-// that are met.
-#define INTERLEAVED_STACK_SIZE (BVH_TOP_STACK_SIZE + BVH_STACK_SIZE + 1 + BVH_WIDTH)
-// Stands on the stack below the tree of an object: the ray leaves the space of the object there.
-#define LEAVE_OBJECT NODE_EMPTY
 
 // Planes of rays that are prepared, in SIMD lanes, for their way through the top level.
 #define PREPARED_INVERSE 0u
@@ -56,8 +51,8 @@ typedef struct {
     uint path;
     uint height;
     RawHit hit; // the nearest so far
-    uint reference[INTERLEAVED_STACK_SIZE];
-    float distance[INTERLEAVED_STACK_SIZE]; // where the ray enters the box of that reference
+    uint reference[ONE_STACK_SIZE];
+    float distance[ONE_STACK_SIZE]; // where the ray enters the box of that reference
 #ifndef TOP_LEVEL_ONLY
     RaySpace world; // where the ray comes back to
 #endif

@@ -1,4 +1,4 @@
-#include "cpu/interleaved.cl"
+#include "cpu/block.cl"
 #include "cpu/lane_triangle.cl"
 
 // Packet traversal: camera rays through the trees, sixteen at a time with one stack, for blocks of paths.
@@ -39,9 +39,8 @@ typedef struct {
     float16 limit, weight[3]; // of the nearest hits so far
     uint16 triangle, object;
     uint height;
-    uint reference[INTERLEAVED_STACK_SIZE];
-    float16
-        near[INTERLEAVED_STACK_SIZE]; // where each ray enters the box of that reference, infinity: nowhere
+    uint reference[ONE_STACK_SIZE];
+    float16 near[ONE_STACK_SIZE]; // where each ray enters the box of that reference, infinity: nowhere
 } Packet;
 
 INLINE uint packet_lanes(const int16 comparison) { return (ushort)__builtin_ia32_cvtd2mask512(comparison); }

@@ -174,9 +174,33 @@ FIRST_HITS = Group(
     ),
 )
 
+REDUCTION = Group(
+    "REDUCTION",
+    None,
+    (
+        _count("group_total", "how many groups of slots there are"),
+        _table("groups", "uint", "the first slot of each group"),
+        _table("samples", "float", "the path buffer: a plane for each channel of each pass"),
+        _count("first_plane", "where the pass begins in it"),
+        _planes("pending", "sums of tiles under way: CHANNELS planes and the number of samples"),
+        _planes("film", "sums of finished tiles, as `pending`"),
+        Argument("nonfinite", "__global uint *", "counts samples with a float that is not finite"),
+    ),
+)
+
+RESOLUTION = Group(
+    "RESOLUTION",
+    None,
+    (
+        _count("pixel_total", "of the picture"),
+        _table("sums", "float", "what `reduce` leaves in `film`"),
+        _planes("image", "interleaved: the channels of the pass, and 1 where there is a sample"),
+    ),
+)
+
 GROUPS = (
     FRAME, SLOTS, LIST, GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE, PATH_STATE, COMPACTION, BLOCK_MEMORY,
-    RADIANCE, FIRST_HITS,
+    RADIANCE, FIRST_HITS, REDUCTION, RESOLUTION,
 )  # fmt: skip
 """Every group."""
 
@@ -195,6 +219,8 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     "write_aovs": (FRAME, LIST, SHADING, PATH_STATE),
     "trace_blocks": (FRAME, SLOTS, *BLOCK, RADIANCE),
     "first_hits": (FRAME, SHADING, PATH_STATE, FIRST_HITS),
+    "reduce": (FRAME, SLOTS, REDUCTION),
+    "resolve": (RESOLUTION,),
 }
 """The groups that each kernel takes, in order."""
 

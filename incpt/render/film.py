@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
+from incpt.core import bindings
 from incpt.device.device import BUILD_SIZES, Device
 from incpt.render.plan import Plan
 from incpt.render.tiles import TileGrid
@@ -106,9 +107,16 @@ class Film:
         a plane of params["buffer_stride"] floats for each channel of each pass."""
         groups = np.unique(plan.slots["group_first"]).astype(np.uint32)
         size = len(groups) * int(params["tile_size"]) ** 2
-        first_slots = self.device.upload(groups)
+        values = {
+            "params": params,
+            "slots": slots,
+            "group_total": len(groups),
+            "groups": self.device.upload(groups),
+            "samples": samples,
+            "nonfinite": self._nonfinite,
+        }
         for layer in self._layers.values():
-            layer.reduce(size, params, np.uint32(len(groups)), first_slots, slots, samples, self._nonfinite)
+            layer.reduce(size, **values)
 
     def first_plane(self, name: str) -> int:
         """Where the planes of a pass begin in the path buffer."""
@@ -123,21 +131,20 @@ class Film:
 
     def idle_launches(self, params: npt.NDArray[np.void], samples: cl.Buffer) -> list[Callable[[], None]]:
         """The launches of the film's kernels, each with nothing to do; see `Device.built`."""
-        nothing, none = np.uint32(0), self._nonfinite
+        none = self._nonfinite
+        values = {"params": params, "slots": none, "group_total": 0, "groups": none}
+        values |= {"samples": samples, "nonfinite": none}
         launches: list[Callable[[], None]] = []
         for layer in self._layers.values():
-            launches += [
-                partial(layer.reduce, size, params, nothing, none, none, samples, none)
-                for size in BUILD_SIZES
-            ]
-            launches += [partial(layer.resolve, size, nothing) for size in BUILD_SIZES]
+            launches += [partial(layer.reduce, size, **values) for size in BUILD_SIZES]
+            launches += [partial(layer.resolve, size, 0) for size in BUILD_SIZES]
         return launches
 
     def image(self, name: str = RADIANCE.name) -> Float32Array:
         """(height, width, channels + 1) the picture of a pass, for radiance its mean, linear; the last
         channel is 1, or 0 where there is no sample yet."""
         layer, pixels = self._layers[name], self.width * self.height
-        layer.resolve(pixels, np.uint32(pixels))
+        layer.resolve(pixels, pixels)
         image = np.empty((self.height, self.width, layer.film_pass.channels + 1), np.float32)
         return self.device.read(layer.image, image)
 
@@ -161,34 +168,26 @@ class _Layer:
     buffer."""
 
     def __init__(self, device: Device, film_pass: FilmPass, first_plane: int, pixels: int) -> None:
-        self.device, self.film_pass, self.first_plane = device, film_pass, np.uint32(first_plane)
+        self.device, self.film_pass, self.first_plane = device, film_pass, first_plane
         nbytes = 4 * (film_pass.channels + 1) * pixels
         self.sums, self._pending, self.image = (device.empty(nbytes) for _ in range(3))
         device.fill(self.sums, 0, nbytes)
 
-    def reduce(
-        self,
-        size: int,
-        params: npt.NDArray[np.void],
-        group_total: np.uint32,
-        groups: cl.Buffer,
-        slots: cl.Buffer,
-        samples: cl.Buffer,
-        nonfinite: cl.Buffer,
-    ) -> None:
-        """Launch cl/film/reduce.cl over `size` work-items."""
-        self._launch(
-            "reduce", self.film_pass.accumulation.value, size, params, group_total, groups, slots, samples,
-            self.first_plane, self._pending, self.sums, nonfinite,
-        )  # fmt: skip
+    def reduce(self, size: int, **values: Any) -> None:
+        """Launch cl/film/reduce.cl over `size` work-items; `values` are its arguments that do not follow from
+        the pass."""
+        own = {"first_plane": self.first_plane, "pending": self._pending, "film": self.sums}
+        self._launch("reduce", self.film_pass.accumulation.value, size, own | values)
 
-    def resolve(self, size: int, pixels: np.uint32) -> None:
-        """Launch cl/film/resolve.cl over `size` work-items."""
-        self._launch("resolve", self.film_pass.resolution.value, size, pixels, self.sums, self.image)
+    def resolve(self, size: int, pixels: int) -> None:
+        """Launch cl/film/resolve.cl over `size` work-items, for a picture of so many pixels."""
+        values = {"pixel_total": pixels, "sums": self.sums, "image": self.image}
+        self._launch("resolve", self.film_pass.resolution.value, size, values)
 
-    def _launch(self, name: str, features: tuple[str, ...], size: int, *args: Any) -> None:
+    def _launch(self, name: str, features: tuple[str, ...], size: int, values: Mapping[str, Any]) -> None:
         channels = (f"CHANNELS {self.film_pass.channels}",)
-        self.device.launch(self.device.kernel(name, features=(*channels, *features)), size, *args)
+        kernel = self.device.kernel(name, features=(*channels, *features))
+        self.device.launch(kernel, size, *bindings.arguments(bindings.KERNELS[name], values))
 
 
 def tile_image(grid: TileGrid, per_tile: npt.NDArray[np.integer]) -> npt.NDArray[np.int64]:
