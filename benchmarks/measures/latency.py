@@ -243,7 +243,7 @@ def _start(plan: Plan, is_cached: bool, work: Work) -> Outcome:
     longer than a step) on the screen."""
     with tempfile.TemporaryDirectory() as folder, virtual_display(SCREEN):
         caches = {} if is_cached else dict.fromkeys(("POCL_CACHE_DIR", "XDG_CACHE_HOME"), folder)
-        program = f"from incpt.benchmarks.latency import first_picture; first_picture({plan.size})"
+        program = f"from {__name__} import first_picture; first_picture({plan.size})"
         variables = {**os.environ, **caches, "INCPT_CONFIG_DIR": folder}
         work.timing_starts()
         began = time.monotonic()

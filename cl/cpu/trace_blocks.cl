@@ -276,7 +276,7 @@ INLINE void trace_block(const Block *block, __global float *path_buffer, uint fi
 }
 
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
-trace_blocks(FRAME_PARAMETERS, SLOTS_PARAMETERS, BLOCK_PARAMETERS, RADIANCE_PARAMETERS) {
+trace_blocks(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, BLOCK_PARAMETERS, RADIANCE_PARAMETERS) {
     const Block block = BLOCK_OF(&params, slots);
     const uint first = (uint)get_group_id(0) * BLOCK_PATHS;
     const uint size = first < params.path_count ? MIN(params.path_count - first, BLOCK_PATHS) : 0;

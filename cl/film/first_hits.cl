@@ -2,7 +2,8 @@
 
 // Auxiliary values of the first hit, from rays through pixel centres. `first_surface` has seven planes over
 // the pixels: shading normal, distance along the ray in metres, base colour; a miss has distance infinity.
-__kernel void first_hits(FRAME_PARAMETERS, SHADING_PARAMETERS, PATH_STATE_PARAMETERS, FIRST_HITS_PARAMETERS) {
+__kernel void first_hits(LAUNCH_PARAMETERS, SHADING_PARAMETERS, PATH_STATE_PARAMETERS,
+                         FIRST_HITS_PARAMETERS) {
     const State state = STATE_OF(params);
     uint path = (uint)get_global_id(0);
     if (path >= params.path_count || load_class(&state, path) == 0u)

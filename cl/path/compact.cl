@@ -4,7 +4,7 @@
 // class that each list asks for; the lists grow from the lengths that they have. Terminated paths are in no
 // list, so that they cost nothing from here on. The order in which paths stand in a list depends on the
 // device's timing; no result does, since a path only writes to itself.
-__kernel void compact(FRAME_PARAMETERS, LIST_PARAMETERS, PATH_STATE_PARAMETERS, COMPACTION_PARAMETERS) {
+__kernel void compact(LAUNCH_PARAMETERS, LIST_PARAMETERS, PATH_STATE_PARAMETERS, COMPACTION_PARAMETERS) {
     __global const uint *classes = (__global const uint *)paths + PATH_CLASS * params.path_stride;
     uint count = takes_all ? params.path_count : lengths[length_place];
     uint begin = (uint)get_global_id(0) * COMPACT_BLOCK;

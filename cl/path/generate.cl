@@ -42,7 +42,7 @@ INLINE void generate_path(const Params *params, __global const Slot *slots, cons
 
 #ifndef BLOCKS
 // Starts the paths of a chunk.
-__kernel void generate(FRAME_PARAMETERS, SLOTS_PARAMETERS, PATH_STATE_PARAMETERS) {
+__kernel void generate(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, PATH_STATE_PARAMETERS) {
     const State state = STATE_OF(params);
     uint k = (uint)get_global_id(0);
     int started = k < params.path_count;

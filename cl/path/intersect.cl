@@ -3,8 +3,9 @@
 
 // Finds the nearest hit of each path's ray, and what the surface is like there. The hint keeps compilers from
 // making SIMD lanes of work-items, as Intel's would: the lanes are boxes and triangles.
-__kernel __attribute__((vec_type_hint(float8))) void
-intersect(FRAME_PARAMETERS, LIST_PARAMETERS, GEOMETRY_PARAMETERS, SHADING_PARAMETERS, PATH_STATE_PARAMETERS) {
+__kernel __attribute__((vec_type_hint(float8))) void intersect(LAUNCH_PARAMETERS, LIST_PARAMETERS,
+                                                               GEOMETRY_PARAMETERS, SHADING_PARAMETERS,
+                                                               PATH_STATE_PARAMETERS) {
     if (get_global_id(0) >= lengths[length_place])
         return;
     const uint path = list[get_global_id(0)];

@@ -19,7 +19,7 @@ INLINE void sample_lights_path(const Params *params, const Emitters *emitters, c
 }
 
 #ifndef BLOCKS
-__kernel void sample_lights(FRAME_PARAMETERS, LIST_PARAMETERS, EMITTERS_PARAMETERS, PATH_STATE_PARAMETERS) {
+__kernel void sample_lights(LAUNCH_PARAMETERS, LIST_PARAMETERS, EMITTERS_PARAMETERS, PATH_STATE_PARAMETERS) {
     RETURN_IF_GROUP_IS_IDLE(lengths[length_place])
     const State state = STATE_OF(params);
     const Emitters emitters = {EMITTERS_ARGUMENTS};

@@ -88,7 +88,7 @@ INLINE void shade_path(const Params *params, const Shading *shading, const State
 
 #ifndef BLOCKS
 // The variant EMISSION_ONLY serves rays after which no path goes on.
-__kernel void shade(FRAME_PARAMETERS, LIST_PARAMETERS, SHADING_PARAMETERS, PATH_STATE_PARAMETERS) {
+__kernel void shade(LAUNCH_PARAMETERS, LIST_PARAMETERS, SHADING_PARAMETERS, PATH_STATE_PARAMETERS) {
     RETURN_IF_GROUP_IS_IDLE(lengths[length_place])
     const State state = STATE_OF(params);
     const Shading shading = {SHADING_ARGUMENTS};

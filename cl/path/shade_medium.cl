@@ -141,7 +141,7 @@ INLINE void absorb_light(const Shading *shading, const State *state, uint path) 
 }
 
 #ifndef BLOCKS
-__kernel void shade_medium(FRAME_PARAMETERS, LIST_PARAMETERS, SHADING_PARAMETERS, PATH_STATE_PARAMETERS) {
+__kernel void shade_medium(LAUNCH_PARAMETERS, LIST_PARAMETERS, SHADING_PARAMETERS, PATH_STATE_PARAMETERS) {
     if (get_global_id(0) >= lengths[length_place])
         return;
     const State state = STATE_OF(params);

@@ -21,7 +21,7 @@ INLINE void shade_miss_path(const Params *params, const Shading *shading, const 
 }
 
 #ifndef BLOCKS
-__kernel void shade_miss(FRAME_PARAMETERS, LIST_PARAMETERS, SHADING_PARAMETERS, EMITTERS_PARAMETERS,
+__kernel void shade_miss(LAUNCH_PARAMETERS, LIST_PARAMETERS, SHADING_PARAMETERS, EMITTERS_PARAMETERS,
                          PATH_STATE_PARAMETERS) {
     RETURN_IF_GROUP_IS_IDLE(lengths[length_place])
     const State state = STATE_OF(params);

@@ -4,7 +4,7 @@
 // gathered. The hint keeps compilers from making SIMD lanes of work-items, as Intel's would: the lanes are
 // boxes and triangles.
 __kernel __attribute__((vec_type_hint(float8))) void
-trace_shadow(FRAME_PARAMETERS, LIST_PARAMETERS, GEOMETRY_PARAMETERS, PATH_STATE_PARAMETERS) {
+trace_shadow(LAUNCH_PARAMETERS, LIST_PARAMETERS, GEOMETRY_PARAMETERS, PATH_STATE_PARAMETERS) {
     if (get_global_id(0) >= lengths[length_place])
         return;
     const uint path = list[get_global_id(0)];

@@ -20,7 +20,7 @@ INLINE void write_aovs_path(const Shading *shading, const State *state, uint pat
 }
 
 #ifndef BLOCKS
-__kernel void write_aovs(FRAME_PARAMETERS, LIST_PARAMETERS, SHADING_PARAMETERS, PATH_STATE_PARAMETERS) {
+__kernel void write_aovs(LAUNCH_PARAMETERS, LIST_PARAMETERS, SHADING_PARAMETERS, PATH_STATE_PARAMETERS) {
     RETURN_IF_GROUP_IS_IDLE(lengths[length_place])
     const State state = STATE_OF(params);
     const Shading shading = {SHADING_ARGUMENTS};

@@ -4,7 +4,7 @@ A group stands for the parameters of a kernel, the members of a C struct and wha
 same order. The header has three things for the group GEOMETRY, say: `GEOMETRY_PARAMETERS` for the parameter
 list of a kernel, `GEOMETRY_ARGUMENTS` for their names, and the struct `Geometry`, so that a kernel reads
 
-    __kernel void intersect(FRAME_PARAMETERS, LIST_PARAMETERS, GEOMETRY_PARAMETERS, ...) {
+    __kernel void intersect(LAUNCH_PARAMETERS, LIST_PARAMETERS, GEOMETRY_PARAMETERS, ...) {
         const Geometry geometry = {GEOMETRY_ARGUMENTS};
 
 `KERNELS` names the groups of every kernel; `arguments` looks up what they are bound to by name. A test
@@ -66,7 +66,7 @@ def _count(name: str, holds: str) -> Argument:
     return Argument(name, "uint", holds)
 
 
-FRAME = Group("FRAME", None, (Argument("params", "Params", "the settings of this launch"),))
+LAUNCH = Group("LAUNCH", None, (Argument("params", "Params", "the settings of this launch"),))
 
 SLOTS = Group("SLOTS", None, (_table("slots", "Slot", "which tile and which samples are in which slot"),))
 
@@ -199,7 +199,7 @@ RESOLUTION = Group(
 )
 
 GROUPS = (
-    FRAME, SLOTS, LIST, GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE, PATH_STATE, COMPACTION, BLOCK_MEMORY,
+    LAUNCH, SLOTS, LIST, GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE, PATH_STATE, COMPACTION, BLOCK_MEMORY,
     RADIANCE, FIRST_HITS, REDUCTION, RESOLUTION,
 )  # fmt: skip
 """Every group."""
@@ -208,18 +208,18 @@ BLOCK = (GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE, BLOCK_MEMORY)
 """What kernels over blocks of paths need of a scene, and the memory of a block: BLOCK_PARAMETERS in C."""
 
 KERNELS: dict[str, tuple[Group, ...]] = {
-    "generate": (FRAME, SLOTS, PATH_STATE),
-    "compact": (FRAME, LIST, PATH_STATE, COMPACTION),
-    "intersect": (FRAME, LIST, GEOMETRY, SHADING, PATH_STATE),
-    "sample_lights": (FRAME, LIST, EMITTERS, PATH_STATE),
-    "shade": (FRAME, LIST, SHADING, PATH_STATE),
-    "shade_medium": (FRAME, LIST, SHADING, PATH_STATE),
-    "shade_miss": (FRAME, LIST, SHADING, EMITTERS, PATH_STATE),
-    "trace_shadow": (FRAME, LIST, GEOMETRY, PATH_STATE),
-    "write_aovs": (FRAME, LIST, SHADING, PATH_STATE),
-    "trace_blocks": (FRAME, SLOTS, *BLOCK, RADIANCE),
-    "first_hits": (FRAME, SHADING, PATH_STATE, FIRST_HITS),
-    "reduce": (FRAME, SLOTS, REDUCTION),
+    "generate": (LAUNCH, SLOTS, PATH_STATE),
+    "compact": (LAUNCH, LIST, PATH_STATE, COMPACTION),
+    "intersect": (LAUNCH, LIST, GEOMETRY, SHADING, PATH_STATE),
+    "sample_lights": (LAUNCH, LIST, EMITTERS, PATH_STATE),
+    "shade": (LAUNCH, LIST, SHADING, PATH_STATE),
+    "shade_medium": (LAUNCH, LIST, SHADING, PATH_STATE),
+    "shade_miss": (LAUNCH, LIST, SHADING, EMITTERS, PATH_STATE),
+    "trace_shadow": (LAUNCH, LIST, GEOMETRY, PATH_STATE),
+    "write_aovs": (LAUNCH, LIST, SHADING, PATH_STATE),
+    "trace_blocks": (LAUNCH, SLOTS, *BLOCK, RADIANCE),
+    "first_hits": (LAUNCH, SHADING, PATH_STATE, FIRST_HITS),
+    "reduce": (LAUNCH, SLOTS, REDUCTION),
     "resolve": (RESOLUTION,),
 }
 """The groups that each kernel takes, in order."""

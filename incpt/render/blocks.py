@@ -32,7 +32,7 @@ class BlockTracer:
 
     def trace(
         self,
-        scene: SceneTables,
+        tables: SceneTables,
         params: npt.NDArray[np.void],
         slots: cl.Buffer,
         path_count: int,
@@ -40,15 +40,15 @@ class BlockTracer:
         aovs: bool = False,
     ) -> None:
         """See `tracer.Tracer`. No path at all builds the kernel."""
-        whole = scheduled(params, scene)
+        whole = scheduled(params, tables)
         whole["path_count"] = path_count
-        kernel = self.device.kernel("trace_blocks", features=(*scene.variant, *(("AOVS",) if aovs else ())))
+        kernel = self.device.kernel("trace_blocks", features=(*tables.variant, *(("AOVS",) if aovs else ())))
         values = {"params": whole, "slots": slots, "path_buffer": path_buffer}
-        launch(self.device, kernel, bindings.KERNELS["trace_blocks"], path_count, values, scene)
+        launch(self.device, kernel, bindings.KERNELS["trace_blocks"], path_count, values, tables)
 
     def first_hits(
         self,
-        scene: SceneTables,
+        tables: SceneTables,
         params: npt.NDArray[np.void],
         slots: cl.Buffer,
         path_count: int,
@@ -57,19 +57,19 @@ class BlockTracer:
         radiance: cl.Buffer,
     ) -> None:
         """See `tracer.Tracer`."""
-        self._wavefront.first_hits(scene, params, slots, path_count, surface, object_ids, radiance)
+        self._wavefront.first_hits(tables, params, slots, path_count, surface, object_ids, radiance)
 
     def idle_launches(
         self,
-        scene: SceneTables,
+        tables: SceneTables,
         params: npt.NDArray[np.void],
         slots: cl.Buffer,
         path_buffer: cl.Buffer,
         aovs: bool = False,
     ) -> list[Callable[[], None]]:
         """See `tracer.Tracer`. A work-item is a block of paths, so that grids are small always."""
-        first_hits = self._wavefront.idle_first_hits(scene, params, slots, path_buffer)
-        return [*first_hits, partial(self.trace, scene, params, slots, 0, path_buffer, aovs)]
+        first_hits = self._wavefront.idle_first_hits(tables, params, slots, path_buffer)
+        return [*first_hits, partial(self.trace, tables, params, slots, 0, path_buffer, aovs)]
 
 
 def launch(
@@ -78,15 +78,15 @@ def launch(
     groups: tuple[bindings.Group, ...],
     path_count: int,
     values: Mapping[str, Any],
-    scene: SceneTables,
+    tables: SceneTables,
 ) -> None:
     """Launch a kernel over the blocks of so many paths, one at least; `groups` are what it takes, among them
     bindings.BLOCK. Rays go through the trees of what is not tested by brute force."""
     paths = device.block_paths
     assert paths is not None, f"{device.name} traces no blocks"
     own = {
-        "top_nodes": scene.buffer("block_nodes"),
+        "top_nodes": tables.buffer("block_nodes"),
         "memory": cl.LocalMemory(arena.byte_count(paths)),
     }
-    arguments = bindings.arguments(groups, {**own, **values}, scene)
+    arguments = bindings.arguments(groups, {**own, **values}, tables)
     device.launch(kernel, max(-(-path_count // paths), 1), *arguments, work_group=1)

@@ -28,17 +28,17 @@ Float32Array = npt.NDArray[np.float32]
 
 
 class Accumulation(Enum):
-    """What a pass adds up; values are features of cl/film/reduce.cl."""
+    """What a pass adds up; values are the features of cl/film/reduce.cl, in one text."""
 
-    SUM = ()
-    SQUARES = ("SQUARES",)
+    SUM = ""
+    SQUARES = "SQUARES"
 
 
 class Resolution(Enum):
-    """What the picture of a pass is; values are features of cl/film/resolve.cl."""
+    """What the picture of a pass is; values are the features of cl/film/resolve.cl, in one text."""
 
-    MEAN = ()
-    SUM = ("KEEP_SUMS",)
+    MEAN = ""
+    SUM = "KEEP_SUMS"
 
 
 @dataclass(frozen=True)
@@ -184,9 +184,9 @@ class _Layer:
         values = {"pixel_total": pixels, "sums": self.sums, "image": self.image}
         self._launch("resolve", self.film_pass.resolution.value, size, values)
 
-    def _launch(self, name: str, features: tuple[str, ...], size: int, values: Mapping[str, Any]) -> None:
-        channels = (f"CHANNELS {self.film_pass.channels}",)
-        kernel = self.device.kernel(name, features=(*channels, *features))
+    def _launch(self, name: str, features: str, size: int, values: Mapping[str, Any]) -> None:
+        channels = f"CHANNELS {self.film_pass.channels}"
+        kernel = self.device.kernel(name, features=(channels, *features.split()))
         self.device.launch(kernel, size, *bindings.arguments(bindings.KERNELS[name], values))
 
 

@@ -13,11 +13,11 @@ from incpt.core import layout
 from incpt.tables.scene_tables import SceneTables
 
 
-def scheduled(params: npt.NDArray[np.void], scene: SceneTables) -> npt.NDArray[np.void]:
+def scheduled(params: npt.NDArray[np.void], tables: SceneTables) -> npt.NDArray[np.void]:
     """A copy of `params` with last_ray and sees_sky filled in."""
     filled = params.copy()
     # Without media every ray is a scattering event, so that all paths end with the same one.
-    last = layout.MOST_RAYS - 1 if scene.has_media else int(params["max_bounces"]) + 1
+    last = layout.MOST_RAYS - 1 if tables.has_media else int(params["max_bounces"]) + 1
     filled["last_ray"] = min(last, layout.MOST_RAYS - 1)
-    filled["sees_sky"] = any(scene.environment_radiance)
+    filled["sees_sky"] = any(tables.environment_radiance)
     return filled

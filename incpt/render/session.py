@@ -243,21 +243,27 @@ class Session:
     def aovs(self, size: tuple[int, int] | None = None, rows: tuple[int, int] | None = None) -> Aovs:
         """Auxiliary images of the scene as it is now along rays through pixel centres, of the session's size
         or another; see Aovs. `rows`: from the first of them up to the second only. Those of the samples of
-        the picture are passes of the film; see `pass_image`."""
-        size = self.size if size is None else size
+        the picture are passes of the film; see `pass_image`. Raises InputError for a size that no picture has
+        and for rows that are not in it."""
+        size = self.size if size is None else replace(self.settings, size=size).size
+        if rows is not None and not 0 <= rows[0] < rows[1] <= size[1]:
+            raise InputError(f"rows: {rows[0]} to {rows[1]} are no rows of {size[1]}; name one at least")
         return first_hits.first_hits(self._tracer, self._tables, self.settings, size, rows)
 
     def pick(self, pixel: tuple[int, int]) -> str | None:
         """The name of the object under a pixel (x, y) from the top left, or None. Raises InputError outside
         the image."""
-        x, y = int(pixel[0]), int(pixel[1])
         width, height = self.size
-        if not (0 <= x < width and 0 <= y < height):
-            raise InputError(f"pixel ({x}, {y}): is outside the image of {width} x {height}")
+        if not (0 <= pixel[0] < width and 0 <= pixel[1] < height):
+            raise InputError(f"pixel ({pixel[0]}, {pixel[1]}): is outside the image of {width} x {height}")
+        x, y = int(pixel[0]), int(pixel[1])
         return self.pick_point(((x + 0.5) / width, (y + 0.5) / height))
 
     def pick_point(self, point: tuple[float, float]) -> str | None:
-        """The name of the object at a point (x, y) from the top left, in units of the image, or None."""
+        """The name of the object at a point (x, y) from the top left, in units of the image, or None: where
+        there is none, and outside the image."""
+        if not (0 <= point[0] <= 1 and 0 <= point[1] <= 1):
+            return None
         return first_hits.object_at(self._tracer, self._tables, self.settings, point)
 
     def build(self, on_progress: Callable[[int, int], None] | None = None) -> None:
@@ -265,7 +271,7 @@ class Session:
         `on_progress` is called with how many of how many steps are done; not at all if nothing is to do.
         What it raises ends the building, which may go on later."""
         aovs = self.settings.aovs
-        kernels = (*self._tables.variant, *(("AOVS",) if aovs else ()))
+        kernels = (*self._tables.variant, *map(str, passes_of(self.settings)))
         if kernels in self.device.built:
             return
         film, path_buffer = self._state.film, self._state.path_buffer

@@ -57,7 +57,7 @@ class _Chunk:
     """Paths that are traced together: in which scene, by which settings, where they leave what they bring,
     and whether auxiliary images are part of it."""
 
-    scene: SceneTables
+    tables: SceneTables
     params: npt.NDArray[np.void]
     path_buffer: cl.Buffer
     aovs: bool = False
@@ -88,7 +88,7 @@ class Wavefront:
 
     def trace(
         self,
-        scene: SceneTables,
+        tables: SceneTables,
         params: npt.NDArray[np.void],
         slots: cl.Buffer,
         path_count: int,
@@ -96,12 +96,12 @@ class Wavefront:
         aovs: bool = False,
     ) -> None:
         """See `tracer.Tracer`."""
-        for chunk in self._chunks(scene, params, path_count, path_buffer, aovs):
+        for chunk in self._chunks(tables, params, path_count, path_buffer, aovs):
             self._trace_chunk(chunk, slots)
 
     def first_hits(
         self,
-        scene: SceneTables,
+        tables: SceneTables,
         params: npt.NDArray[np.void],
         slots: cl.Buffer,
         path_count: int,
@@ -110,14 +110,14 @@ class Wavefront:
         radiance: cl.Buffer,
     ) -> None:
         """What camera rays meet: `surface` and `object_ids` as cl/film/first_hits.cl fills them."""
-        for chunk in self._chunks(scene, params, path_count, radiance):
+        for chunk in self._chunks(tables, params, path_count, radiance):
             self._generate(chunk, slots)
             self._intersect(chunk, 0, chunk.size)
             self._first_hits(chunk, surface, object_ids)
 
     def idle_launches(
         self,
-        scene: SceneTables,
+        tables: SceneTables,
         params: npt.NDArray[np.void],
         slots: cl.Buffer,
         path_buffer: cl.Buffer,
@@ -125,26 +125,26 @@ class Wavefront:
     ) -> list[Callable[[], None]]:
         """A launch of every kernel that `trace` and `first_hits` may need for this scene, each with nothing
         to do; see `Device.built`. `slots` holds one slot, which lanes without a path read."""
-        chunk = self._chunk(scene, params, 0, 0, path_buffer)
+        chunk = self._chunk(tables, params, 0, 0, path_buffer)
         stages: list[Callable[[], object]] = [
             partial(self._sample_lights, chunk, 0, 0, PathList.SURFACE),
             partial(self._shade, chunk, 0, 0),
             partial(self._trace_shadows, chunk, 0, 0),
             partial(self._shade_misses, chunk, 0, 0),
         ]
-        if scene.has_media:
+        if tables.has_media:
             stages.append(partial(self._shade_media, chunk, 0, 0))
         else:
             stages.append(partial(self._shade, chunk, 0, 0, last=True))
         if aovs:
             stages.append(partial(self._write_aovs, chunk, 0))
-        return [*self.idle_first_hits(scene, params, slots, path_buffer), *self._idle(stages)]
+        return [*self.idle_first_hits(tables, params, slots, path_buffer), *self._idle(stages)]
 
     def idle_first_hits(
-        self, scene: SceneTables, params: npt.NDArray[np.void], slots: cl.Buffer, radiance: cl.Buffer
+        self, tables: SceneTables, params: npt.NDArray[np.void], slots: cl.Buffer, radiance: cl.Buffer
     ) -> list[Callable[[], None]]:
         """As `idle_launches`, of the kernels that `first_hits` needs alone."""
-        chunk = self._chunk(scene, params, 0, 0, radiance)
+        chunk = self._chunk(tables, params, 0, 0, radiance)
         nothing = self._lengths
         return self._idle(
             [
@@ -167,29 +167,29 @@ class Wavefront:
 
     def _chunks(
         self,
-        scene: SceneTables,
+        tables: SceneTables,
         params: npt.NDArray[np.void],
         path_count: int,
         path_buffer: cl.Buffer,
         aovs: bool = False,
     ) -> list[_Chunk]:
         return [
-            self._chunk(scene, params, first, min(self.chunk_paths, path_count - first), path_buffer, aovs)
+            self._chunk(tables, params, first, min(self.chunk_paths, path_count - first), path_buffer, aovs)
             for first in range(0, path_count, self.chunk_paths)
         ]
 
     def _chunk(
         self,
-        scene: SceneTables,
+        tables: SceneTables,
         params: npt.NDArray[np.void],
         first: int,
         size: int,
         path_buffer: cl.Buffer,
         aovs: bool = False,
     ) -> _Chunk:
-        own = scheduled(params, scene)
+        own = scheduled(params, tables)
         own["first_path"], own["path_count"], own["path_stride"] = first, size, self.stride
-        return _Chunk(scene, own, path_buffer, aovs)
+        return _Chunk(tables, own, path_buffer, aovs)
 
     def _trace_chunk(self, chunk: _Chunk, slots: cl.Buffer) -> None:
         self._generate(chunk, slots)
@@ -219,7 +219,7 @@ class Wavefront:
             self._shade_misses(chunk, ray, bound)
         if not last:
             self._sample_lights(chunk, ray, bound, PathList.SURFACE)
-        if chunk.scene.has_media:
+        if chunk.tables.has_media:
             self._sample_lights(chunk, ray, bound, PathList.MEDIUM)
             self._shade_media(chunk, ray, bound)
         self._shade(chunk, ray, bound, last)
@@ -240,25 +240,25 @@ class Wavefront:
         self._launch_listed("write_aovs", chunk, 0, bound, PathList.LIVE)
 
     def _shade_misses(self, chunk: _Chunk, ray: int, bound: int) -> None:
-        features = (*chunk.scene.features, *(("MEDIA",) if chunk.scene.has_media else ()))
+        features = (*chunk.tables.features, *(("MEDIA",) if chunk.tables.has_media else ()))
         self._launch_listed("shade_miss", chunk, ray, bound, PathList.MISS, features)
 
     def _shade(self, chunk: _Chunk, ray: int, bound: int, last: bool = False) -> None:
-        features = ("EMISSION_ONLY",) if last else chunk.scene.features
+        features = ("EMISSION_ONLY",) if last else chunk.tables.features
         self._launch_listed("shade", chunk, ray, bound, PathList.SURFACE, features)
 
     def _trace_shadows(self, chunk: _Chunk, ray: int, bound: int) -> None:
-        if chunk.scene.features:
+        if chunk.tables.features:
             self._launch_listed("trace_shadow", chunk, ray, bound, PathList.SHADOW)
 
     def _sample_lights(self, chunk: _Chunk, ray: int, bound: int, paths: PathList) -> None:
-        if chunk.scene.features:
-            self._launch_listed("sample_lights", chunk, ray, bound, paths, chunk.scene.features)
+        if chunk.tables.features:
+            self._launch_listed("sample_lights", chunk, ray, bound, paths, chunk.tables.features)
 
     def _shade_media(self, chunk: _Chunk, ray: int, bound: int) -> None:
         """Shade the paths at or in transparent bodies. Those that stand on an opaque surface in there join
         the others."""
-        self._launch_listed("shade_medium", chunk, ray, bound, PathList.MEDIUM, chunk.scene.features)
+        self._launch_listed("shade_medium", chunk, ray, bound, PathList.MEDIUM, chunk.tables.features)
         self._compact(chunk, ray, bound, PathList.MEDIUM, (PathList.SURFACE, ray))
 
     def _first_hits(self, chunk: _Chunk, surface: cl.Buffer, object_ids: cl.Buffer) -> None:
@@ -307,7 +307,7 @@ class Wavefront:
         """Launch a kernel; its arguments are `values` by name, the planes of paths, and the buffers of the
         scene."""
         known = {**self._planes, "params": chunk.params, "radiance": chunk.path_buffer, **values}
-        arguments = bindings.arguments(bindings.KERNELS[name], known, chunk.scene)
+        arguments = bindings.arguments(bindings.KERNELS[name], known, chunk.tables)
         kernel = self.device.kernel(name, features=features)
         self.device.launch(kernel, max(size, self._least_size), *arguments)
 

@@ -15,11 +15,26 @@ LARGEST = 1e9
 """Bound on every length, angle and radiance: squares and products of such numbers still fit float32."""
 
 
-def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """A view of an array that cannot be written to."""
-    view = array.view()
-    view.flags.writeable = False
-    return view
+def frozen(values: npt.ArrayLike, dtype: npt.DTypeLike) -> npt.NDArray[Any]:
+    """A C-contiguous array of these values that nobody can write to: a copy, unless they are one already.
+
+    Without a copy a caller who reuses an array would change a scene that is long made, and those that undo
+    goes back to.
+    """
+    array = np.ascontiguousarray(values, dtype)
+    if not _is_frozen(array):
+        array = array.copy()
+        array.flags.writeable = False
+    return array
+
+
+def _is_frozen(array: npt.NDArray[Any]) -> bool:
+    memory: Any = array
+    while isinstance(memory, np.ndarray):
+        if memory.flags.writeable:
+            return False
+        memory = memory.base
+    return memory is None
 
 
 def set_number(owner: object, name: str, low: float, high: float) -> None:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from incpt.core.errors import InputError
 from incpt.core.layout import ENVIRONMENT_MAX_SIZE
-from incpt.scene.checks import read_only
+from incpt.scene.checks import frozen
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +23,7 @@ class Image:
     source: str | None = None
 
     def __post_init__(self) -> None:
-        pixels = np.ascontiguousarray(self.pixels, np.float32)
+        pixels = frozen(self.pixels, np.float32)
         if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.size == 0:
             raise InputError(f"image: has shape {pixels.shape}; an environment has shape (height, width, 3)")
         if max(pixels.shape[:2]) > ENVIRONMENT_MAX_SIZE:
@@ -33,4 +33,4 @@ class Image:
             )
         if not np.isfinite(pixels).all() or pixels.min() < 0:
             raise InputError("image: holds negative, infinite or undefined radiance; repair the file")
-        object.__setattr__(self, "pixels", read_only(pixels))
+        object.__setattr__(self, "pixels", pixels)

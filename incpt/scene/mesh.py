@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core.errors import InputError
-from incpt.scene.checks import LARGEST, read_only
+from incpt.scene.checks import LARGEST, frozen
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ class Mesh:
     source: MeshSource = MeshSource()
 
     def __post_init__(self) -> None:
-        vertices = np.ascontiguousarray(self.vertices, np.float32)
-        faces = np.ascontiguousarray(self.faces, np.int32)
+        vertices = frozen(self.vertices, np.float32)
+        faces = frozen(self.faces, np.int32)
         if vertices.ndim != 2 or vertices.shape[1] != 3:
             raise InputError(f"vertices: have shape {vertices.shape}; a mesh has shape (V, 3)")
         if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
@@ -46,13 +46,13 @@ class Mesh:
             raise InputError(f"faces: use a vertex outside 0 to {len(vertices) - 1}")
         if not np.isfinite(vertices).all() or np.abs(vertices).max() > LARGEST:
             raise InputError(f"vertices: hold a number that is not finite or beyond {LARGEST:g}")
-        object.__setattr__(self, "vertices", read_only(vertices))
-        object.__setattr__(self, "faces", read_only(faces))
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "faces", faces)
         if self.normals is not None:
-            normals = np.ascontiguousarray(self.normals, np.float32)
+            normals = frozen(self.normals, np.float32)
             if normals.shape != (len(faces), 3, 3) or not np.isfinite(normals).all():
                 raise InputError(f"normals: need shape ({len(faces)}, 3, 3) and finite numbers")
-            object.__setattr__(self, "normals", read_only(normals))
+            object.__setattr__(self, "normals", normals)
 
     @cached_property
     def bounds(self) -> npt.NDArray[np.float32]:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from incpt.core import affine
 from incpt.core.affine import Vector
 from incpt.core.errors import InputError
-from incpt.scene.checks import LARGEST, checked_number, read_only, set_vector
+from incpt.scene.checks import LARGEST, checked_number, frozen, set_vector
 
 Row = tuple[float, float, float, float]
 Rows = tuple[Row, Row, Row]
@@ -74,8 +74,8 @@ class Transform:
     def world_from_object(self) -> npt.NDArray[np.float64]:
         """(3, 4) affine matrix, which cannot be written to."""
         if self.matrix is not None:
-            return read_only(np.array(self.matrix))
-        return read_only(affine.compose(self.position, self.rotation, self.scale))
+            return frozen(self.matrix, np.float64)
+        return frozen(affine.compose(self.position, self.rotation, self.scale), np.float64)
 
     def with_parts(
         self,

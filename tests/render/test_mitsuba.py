@@ -1,4 +1,4 @@
-"""Renders against Mitsuba 3, whose pictures tests/references/make_references.py has stored."""
+"""Renders against Mitsuba 3, whose pictures tests/support/references/make_references.py has stored."""
 
 from __future__ import annotations
 

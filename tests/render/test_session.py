@@ -601,3 +601,21 @@ def test_triangles_on_top_look_like_objects(
     np.testing.assert_allclose(actual.normal[same], wanted.normal[same], atol=1e-3)
     seen = same & (actual.object_id >= 0)
     np.testing.assert_allclose(actual.depth[seen], wanted.depth[seen], rtol=1e-4)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e39, -0.1, 1.1])
+def test_points_that_no_picture_has_show_nothing(device: Device, bad: float) -> None:
+    session = Session(mixed_scene(), device=device)
+    assert session.pick_point((bad, 0.5)) is None and session.pick_point((0.5, bad)) is None
+    with pytest.raises(InputError, match="is outside the image"):
+        session.pick((session.size[0] * bad if abs(bad) > 1 else bad - 1, 0))  # type: ignore[arg-type]
+
+
+def test_rows_that_no_picture_has_are_refused(device: Device) -> None:
+    session = Session(mixed_scene(), device=device)
+    for rows in ((5, 2), (0, 0), (-3, 5), (0, 1000)):
+        with pytest.raises(InputError, match="are no rows of 28; name one at least"):
+            session.aovs(rows=rows)
+    for size in ((0, 5), (10**6, 10**6)):
+        with pytest.raises(InputError, match="size"):
+            session.aovs(size)

@@ -19,7 +19,7 @@ from incpt.scene.change import Change, diff
 from incpt.scene.environment import Environment
 from incpt.scene.image import Image
 from incpt.scene.material import Material
-from incpt.scene.mesh import Mesh, is_deformation
+from incpt.scene.mesh import Mesh, MeshSource, is_deformation
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import SHAPES, shape
 
@@ -197,3 +197,22 @@ def test_placement_and_bounds() -> None:
     assert sorted(map(tuple, affine.box_corners(np.array([[0, 0, 0], [1, 1, 1]])))) == [
         (x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)
     ]
+
+
+def test_what_a_scene_is_made_of_stays_as_it_was() -> None:
+    """Whoever goes on with the arrays that a mesh or an image was made from changes neither."""
+    vertices, faces = np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32)
+    normals = np.ones((1, 3, 3), np.float32)
+    pixels = np.ones((2, 4, 3), np.float32)
+    mesh, image = Mesh(vertices, faces, normals), Image(pixels)
+    view = vertices.view()
+    view.flags.writeable = False
+    viewed = Mesh(view, faces)
+    for array in (vertices, faces, normals, pixels):
+        array.fill(0)
+    assert mesh.vertices.sum() == viewed.vertices.sum() == 3 and mesh.faces.tolist() == [[0, 1, 2]]
+    assert mesh.normals is not None and mesh.normals.min() == 1 and image.pixels.min() == 1
+    again = replace(mesh, source=MeshSource(file="a.ply"))
+    assert again.vertices is mesh.vertices  # what nobody can write to is not copied
+    with pytest.raises(ValueError, match="read-only"):
+        mesh.vertices[0, 0] = 5

@@ -1,4 +1,4 @@
-"""The scenes that are compared with Mitsuba 3; tests/references/make_references.py has rendered them."""
+"""The scenes that are compared with Mitsuba 3; references/make_references.py has rendered them there."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Renders the scenes of tests/reference_scenes.py with Mitsuba 3 and stores what tests/test_mitsuba.py reads.
+"""Renders the scenes of support/reference_scenes.py with Mitsuba 3, and stores what test_mitsuba.py reads.
 
     pip install mitsuba                    # 3.9 made the stored files; its LLVM variant needs libLLVM
-    python tests/references/make_references.py [NAME ...]
+    python tests/support/references/make_references.py [NAME ...]
 
 Each NAME.npz holds `mean` (48, 64, 3) and `error` (same shape), the standard error of that mean from sixteen
 independent renders, both float16.
