@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -177,6 +178,9 @@ def test_the_gizmo_moves_the_object_and_the_exported_picture_shows_it_there(
 
 def test_tiles_far_from_an_edit_keep_their_samples(hand: Hand) -> None:
     editor = hand.app.editor
+    # So many repetitions that the queue is seen on its way on a fast machine too.
+    settings = replace(editor.scene.settings, nor=256)
+    editor.propose(replace(editor.scene, settings=settings), "NoR")
     hand.pump(lambda: editor.frame.pictures[-1].tile_spp.min() >= 4)
     hand.key("F5")
     hand.pump(lambda: editor.frame.resting)
