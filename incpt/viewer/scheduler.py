@@ -111,7 +111,7 @@ class Side:
 
 
 @dataclass(frozen=True, eq=False)
-class Situation:
+class ViewerState:
     """All that `next_work` looks at.
 
     view   what is wanted.
@@ -175,18 +175,18 @@ class Step:
 Work = Follow | ReturnToFull | Step
 
 
-def next_work(situation: Situation) -> Work | None:
+def next_work(state: ViewerState) -> Work | None:
     """What to do next; None: nothing. Edits come first, then the return to full resolution, then a step."""
-    view, now = situation.view, situation.now
-    for place, side in enumerate(situation.sides):
+    view, now = state.view, state.now
+    for place, side in enumerate(state.sides):
         if not shows(side, view) and (view.paused or may_change(side, view, now)):
-            return _follow(situation, place)
+            return _follow(state, place)
     if view.paused:
         return None
-    for place, side in enumerate(situation.sides):
+    for place, side in enumerate(state.sides):
         if side.divisor > 1 and side.is_answered and rests(side, now):
             return ReturnToFull(place, settings_of(side.view, side.strategy, side.whole, 1))
-    return _step(situation)
+    return _step(state)
 
 
 def shows(side: Side, view: View) -> bool:
@@ -220,10 +220,10 @@ def is_done(side: Side, target_spp: int | None) -> bool:
     )
 
 
-def _follow(situation: Situation, place: int) -> Follow:
-    view, side = situation.view, situation.sides[place]
+def _follow(state: ViewerState, place: int) -> Follow:
+    view, side = state.view, state.sides[place]
     # A picture that starts over beside one that is kept is shown as it is, so that they can be compared.
-    with_preview = not view.paused and (side is situation.main or situation.main.divisor > 1)
+    with_preview = not view.paused and (side is state.main or state.main.divisor > 1)
     divisor = side.divisor
     if with_preview and _starts_over(side, view):
         divisor = fitting_divisor(view, side.whole, side.divisor)
@@ -252,9 +252,9 @@ def _starts_over(side: Side, view: View) -> bool:
     return is_local and next_mode(side.progress.mode, Event.LOCAL_CHANGE, strategy) is Mode.BASE
 
 
-def _step(situation: Situation) -> Step | None:
+def _step(state: ViewerState) -> Step | None:
     """Whose turn it is: equal time for both, and the answer to an edit first."""
-    view, sides, spent = situation.view, situation.sides, situation.spent
+    view, sides, spent = state.view, state.sides, state.spent
     waiting = [place for place, side in enumerate(sides) if not is_done(side, view.target_spp)]
     if not waiting:
         return None

@@ -25,7 +25,7 @@ from incpt.render.strategies import RESTART
 from incpt.viewer import scheduler
 from incpt.viewer.pace import Pace
 from incpt.viewer.picture import FirstHitReader, PictureReader
-from incpt.viewer.scheduler import Follow, ReturnToFull, Side, Situation, Step
+from incpt.viewer.scheduler import Follow, ReturnToFull, Side, Step, ViewerState
 from incpt.viewer.view import Float32Image, Frame, View
 
 
@@ -63,7 +63,7 @@ class Viewer:
         self._rest_is_shown = False
         self._step_seconds, self._speed = 0.0, 0.0
         side, seat = self._opened(view, None)
-        self._situation = Situation(view, (side,), (0.0,), clock())
+        self._state = ViewerState(view, (side,), (0.0,), clock())
         self._seats: tuple[_Seat, ...] = (seat,)
         pace = Pace(5e6 if self.device.is_cpu else 5e8)
         self._first_hits = FirstHitReader(seat.session, pace, clock)
@@ -105,7 +105,7 @@ class Viewer:
         """Throw away what was accumulated; the picture stands until it is rendered anew."""
         for place, seat in enumerate(self._seats):
             seat.session.restart()
-            self._note(place, scheduler.restarted(self._situation.sides[place], seat.session.progress))
+            self._note(place, scheduler.restarted(self._state.sides[place], seat.session.progress))
         self._rest_is_shown = False
 
     def pin_reference(self, on: bool) -> None:
@@ -122,19 +122,19 @@ class Viewer:
             settings = scheduler.settings_of(main.view, main.strategy, main.whole, 1)
             self._return_to_full(ReturnToFull(place, settings))
         while self.session.mode is Mode.BASE:
-            slots = scheduler.slots_of_step(self._main, self._situation.view.step_ms)
-            self._step(Step(place, slots, self._situation.spent))
+            slots = scheduler.slots_of_step(self._main, self._state.view.step_ms)
+            self._step(Step(place, slots, self._state.spent))
         write_picture(Path(path), self.session, aovs, exposure, curve)
 
     # ------------------------------------------------------------------------------------ following the view
 
     @property
     def _main(self) -> Side:
-        return self._situation.main
+        return self._state.main
 
     def _follow(self, view: View) -> Step | None:
         """Do all that leads to the view but the rendering; returns the step that is to be rendered then."""
-        known = self._situation.view
+        known = self._state.view
         if view is known or view is self._refused or view == self._refused:
             view = known
         elif view != known:
@@ -143,15 +143,15 @@ class Viewer:
         try:
             self._split(view)
             while True:
-                situation = replace(self._situation, view=view, now=self._clock())
-                work = scheduler.next_work(situation)
+                state = replace(self._state, view=view, now=self._clock())
+                work = scheduler.next_work(state)
                 if isinstance(work, Follow):
                     self._bring(work)
                 elif isinstance(work, ReturnToFull):
                     good = self._main.full_view
                     self._return_to_full(work)
                 else:
-                    self._situation = replace(self._situation, view=view)
+                    self._state = replace(self._state, view=view)
                     return work
         except (InputError, DeviceError, MemoryError) as error:
             if good is None:
@@ -164,19 +164,19 @@ class Viewer:
                 resolution_scale=good.resolution_scale,
                 split=len(self._seats) > 1,
             )
-            self._situation = replace(self._situation, view=shown)
+            self._state = replace(self._state, view=shown)
             raise
 
     def _split(self, view: View) -> None:
-        situation, seats = self._situation, self._seats
+        state, seats = self._state, self._seats
         if not view.split:
             self._seats = seats[-1:]
-            self._situation = replace(situation, sides=situation.sides[-1:], spent=situation.spent[-1:])
+            self._state = replace(state, sides=state.sides[-1:], spent=state.spent[-1:])
         elif len(seats) == 1:
             side, seat = self._opened(view, RESTART.name)
             self._seats = (seat, *seats)
-            sides, spent = (side, *situation.sides), situation.spent * 2
-            self._situation = replace(situation, sides=sides, spent=spent)
+            sides, spent = (side, *state.sides), state.spent * 2
+            self._state = replace(state, sides=sides, spent=spent)
 
     def _opened(self, view: View, strategy: str | None) -> tuple[Side, _Seat]:
         whole = Pace(1e6 if self.device.is_cpu else 5e7)
@@ -190,7 +190,7 @@ class Viewer:
         """On an error everything stays as it was."""
         session = self._seats[work.side].session
         if work.divisor > 1:
-            side = self._situation.sides[work.side]
+            side = self._state.sides[work.side]
             check_settings(scheduler.settings_of(work.view, side.strategy, side.whole, 1))
         order = session.queue.tiles
         session.edit(work.view.scene, work.pixel, work.since, work.settings)
@@ -199,7 +199,7 @@ class Viewer:
             session.end_drag(work.since, work.pixel)
         if work.divisor > 1 and session.mode is Mode.INCREMENTAL:
             session.restart()
-        side = self._situation.sides[work.side]
+        side = self._state.sides[work.side]
         self._note(work.side, scheduler.followed(side, work, session.progress, self._clock()))
         session.build(self._on_build)
         height_width = work.view.size[::-1]
@@ -209,12 +209,12 @@ class Viewer:
     def _return_to_full(self, work: ReturnToFull) -> None:
         session = self._seats[work.side].session
         session.configure(work.settings)
-        side = self._situation.sides[work.side]
+        side = self._state.sides[work.side]
         self._note(work.side, scheduler.returned_to_full(side, session.progress))
 
     def _note(self, place: int, side: Side) -> None:
-        sides = self._situation.sides
-        self._situation = replace(self._situation, sides=(*sides[:place], side, *sides[place + 1 :]))
+        sides = self._state.sides
+        self._state = replace(self._state, sides=(*sides[:place], side, *sides[place + 1 :]))
 
     # ------------------------------------------------------------------------------------ work
 
@@ -230,29 +230,29 @@ class Viewer:
         start = self._clock()
         report = session.step(step.slots)
         seconds = max(self._clock() - start, 1e-6)
-        side = self._situation.sides[step.side]
+        side = self._state.sides[step.side]
         self._note(step.side, scheduler.stepped(side, report, seconds, session.progress))
         spent = tuple(t + seconds * (place == step.side) for place, t in enumerate(step.spent))
-        self._situation = replace(self._situation, spent=spent)
+        self._state = replace(self._state, spent=spent)
         return report, seconds
 
     def _has_first_hits(self, is_idle: bool) -> bool:
         """Whether all first hits are there that are wanted; some rows more of them, unless an edit waits for
         its answer."""
-        view, main = self._situation.view, self._main
+        view, main = self._state.view, self._main
         if not view.aovs:
             return True
         return (main.is_answered or is_idle) and self._first_hits.advance(view, main)
 
     def _frame(self, resting: bool) -> Frame:
-        main, view = self._main, self._situation.view
+        main, view = self._main, self._state.view
         if self._is_pinning and main.divisor == 1:
             image = self._seats[-1].reader.image(main, must_be_new=True)
             if image[..., 3].min() > 0:
                 self._reference, self._is_pinning = image[..., :3], False
         pictures = tuple(
             seat.reader.picture(side, self._reference, resting)
-            for seat, side in zip(self._seats, self._situation.sides, strict=True)
+            for seat, side in zip(self._seats, self._state.sides, strict=True)
         )
         if not scheduler.shows(main, view):
             shown = main.view
@@ -267,7 +267,7 @@ class Viewer:
             paths_per_second=self._speed,
             device=self.device.name,
             aovs=self._first_hits.aovs if view.aovs else None,
-            nonfinite=sum(side.nonfinite for side in self._situation.sides),
+            nonfinite=sum(side.nonfinite for side in self._state.sides),
             resting=resting,
             is_pinned=self._reference is not None or self._is_pinning,
         )

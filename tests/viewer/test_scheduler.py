@@ -20,7 +20,7 @@ from incpt.scene.change import diff
 from incpt.scene.model import Scene
 from incpt.viewer import scheduler
 from incpt.viewer.pace import Pace, TileCosts
-from incpt.viewer.scheduler import Follow, ReturnToFull, Side, Situation, Step
+from incpt.viewer.scheduler import Follow, ReturnToFull, Side, Step, ViewerState
 from incpt.viewer.view import View
 
 FAST, SLOW = Pace(1e7), Pace(6e4)
@@ -63,10 +63,8 @@ def side_of(
     return replace(side, is_answered=True, changed_at=NOW - 10)
 
 
-def situation(
-    view: View, *sides: Side, spent: tuple[float, ...] | None = None, now: float = NOW
-) -> Situation:
-    return Situation(view, sides, spent or (0.0,) * len(sides), now)
+def state(view: View, *sides: Side, spent: tuple[float, ...] | None = None, now: float = NOW) -> ViewerState:
+    return ViewerState(view, sides, spent or (0.0,) * len(sides), now)
 
 
 def report_of(side: Side, tiles: list[int], done: int, paths: int = 64) -> StepReport:
@@ -81,17 +79,17 @@ def test_an_edit_is_taken_up_once_the_one_before_is_answered() -> None:
     scene = mixed_scene()
     side = side_of(view_of(moved(scene), before=scene))
     next_edit = view_of(moved(scene, 0.3), before=scene)
-    work = scheduler.next_work(situation(next_edit, side))
+    work = scheduler.next_work(state(next_edit, side))
     assert isinstance(work, Follow) and work.view is next_edit and work.side == 0
     waiting = replace(side, is_answered=False)
-    assert isinstance(scheduler.next_work(situation(next_edit, waiting)), Step)
+    assert isinstance(scheduler.next_work(state(next_edit, waiting)), Step)
     # Nobody waits where the view is paused, nor for an edit that belongs to no drag and takes too long.
     paused = replace(next_edit, paused=True)
-    assert isinstance(scheduler.next_work(situation(paused, waiting)), Follow)
+    assert isinstance(scheduler.next_work(state(paused, waiting)), Follow)
     alone = replace(side_of(view_of(scene)), is_answered=False, changed_at=NOW)
     edit = view_of(moved(scene))
-    assert isinstance(scheduler.next_work(situation(edit, alone, now=NOW + 0.4)), Step)
-    assert isinstance(scheduler.next_work(situation(edit, alone, now=NOW + 0.6)), Follow)
+    assert isinstance(scheduler.next_work(state(edit, alone, now=NOW + 0.4)), Step)
+    assert isinstance(scheduler.next_work(state(edit, alone, now=NOW + 0.6)), Follow)
 
 
 def test_an_equal_view_is_nothing_new() -> None:
@@ -125,51 +123,51 @@ def test_what_starts_over_and_does_not_fit_a_step_is_rendered_coarsely(
     scene = mixed_scene(**settings)
     side = side_of(view_of(scene), pace, mode)
     view = view_of(change(scene))
-    work = scheduler.next_work(situation(view, side))
+    work = scheduler.next_work(state(view, side))
     assert isinstance(work, Follow) and work.divisor == divisor
     width, height = view.size
     assert work.settings.size == (-(-width // divisor), -(-height // divisor))
-    paused = scheduler.next_work(situation(replace(view, paused=True), side))
+    paused = scheduler.next_work(state(replace(view, paused=True), side))
     assert isinstance(paused, Follow) and paused.divisor == 1
 
 
 def test_beside_a_kept_picture_the_other_side_is_not_coarse() -> None:
     scene = mixed_scene()
     sides = side_of(view_of(scene), SLOW, strategy="restart"), side_of(view_of(scene), SLOW)
-    work = scheduler.next_work(situation(view_of(moved(scene), split=True), *sides))
+    work = scheduler.next_work(state(view_of(moved(scene), split=True), *sides))
     assert isinstance(work, Follow) and (work.side, work.divisor) == (0, 1)
     assert work.settings.strategy == "restart"
     coarse = replace(sides[1], divisor=2)
-    work = scheduler.next_work(situation(view_of(moved(scene), split=True), sides[0], coarse))
+    work = scheduler.next_work(state(view_of(moved(scene), split=True), sides[0], coarse))
     assert isinstance(work, Follow) and (work.side, work.divisor) == (0, 2)
 
 
 def test_a_drag_repeats_less_and_its_end_starts_anew() -> None:
     scene = mixed_scene(nor=32)
     dragged = view_of(moved(scene), before=scene, drag_nor=4, point=(0.5, 0.25))
-    work = scheduler.next_work(situation(dragged, side_of(view_of(scene))))
+    work = scheduler.next_work(state(dragged, side_of(view_of(scene))))
     assert isinstance(work, Follow) and work.settings.nor == 4 and not work.ends_drag
     assert work.since is scene and work.pixel == (22.0, 7.0)
     # Repetitions fit a step: 6e4 paths a second are 9 times a tile of 64 pixels in 10 ms.
     slow = scheduler.settings_of(replace(dragged, drag_nor=30), None, SLOW, 1)
     assert slow.nor == 9
-    end = scheduler.next_work(situation(view_of(moved(scene)), side_of(dragged)))
+    end = scheduler.next_work(state(view_of(moved(scene)), side_of(dragged)))
     assert isinstance(end, Follow) and end.settings.nor == 32 and end.ends_drag and end.since is scene
     # Repetitions that grow within a drag, because rendering became faster, do not end it.
     faster = replace(side_of(replace(dragged, drag_nor=30), SLOW), whole=FAST)
-    more = scheduler.next_work(situation(view_of(moved(scene, 0.3), before=scene, drag_nor=30), faster))
+    more = scheduler.next_work(state(view_of(moved(scene, 0.3), before=scene, drag_nor=30), faster))
     assert isinstance(more, Follow) and more.settings.nor == 30 > faster.progress.settings.nor
     assert not more.ends_drag and more.since is scene
     # Where tiles had all repetitions already, nothing is to be made up for.
     whole = side_of(replace(dragged, drag_nor=32), Pace(1e9))
-    end = scheduler.next_work(situation(view_of(moved(scene)), whole))
+    end = scheduler.next_work(state(view_of(moved(scene)), whole))
     assert isinstance(end, Follow) and not end.ends_drag and end.since is None
 
 
 def test_a_coarse_picture_has_no_spiral_to_measure() -> None:
     scene = mixed_scene()
     side = side_of(view_of(scene), SLOW, divisor=2)
-    work = scheduler.next_work(situation(view_of(moved(scene), before=scene), side))
+    work = scheduler.next_work(state(view_of(moved(scene), before=scene), side))
     assert isinstance(work, Follow) and work.divisor == 2 and work.since is None
     assert (work.settings.base_nor, work.settings.sample_rate) == (1, 1)
 
@@ -178,12 +176,12 @@ def test_full_resolution_comes_back_once_the_view_rests() -> None:
     scene = mixed_scene()
     view = view_of(scene)
     coarse = replace(side_of(view, SLOW, divisor=2), changed_at=NOW)
-    assert isinstance(scheduler.next_work(situation(view, coarse, now=NOW + 0.1)), Step)
-    work = scheduler.next_work(situation(view, coarse, now=NOW + 0.2))
+    assert isinstance(scheduler.next_work(state(view, coarse, now=NOW + 0.1)), Step)
+    work = scheduler.next_work(state(view, coarse, now=NOW + 0.2))
     assert isinstance(work, ReturnToFull) and work.settings.size == (44, 28)
     unanswered = replace(coarse, is_answered=False)
-    assert isinstance(scheduler.next_work(situation(view, unanswered, now=NOW + 0.2)), Step)
-    assert scheduler.next_work(situation(replace(view, paused=True), coarse, now=NOW + 0.2)) is None
+    assert isinstance(scheduler.next_work(state(view, unanswered, now=NOW + 0.2)), Step)
+    assert scheduler.next_work(state(replace(view, paused=True), coarse, now=NOW + 0.2)) is None
     full = scheduler.returned_to_full(coarse, side_of(view).progress)
     assert full.divisor == 1 and full.full_view is view and full.urgent == full.version > coarse.version
     assert full.is_answered and full.replaced.shape == (24,)
@@ -192,17 +190,17 @@ def test_full_resolution_comes_back_once_the_view_rests() -> None:
 def test_the_end_of_a_drag_does_not_wait_for_rest() -> None:
     scene = mixed_scene()
     side = side_of(view_of(turned(scene), before=scene), SLOW, divisor=2)
-    work = scheduler.next_work(situation(view_of(turned(scene)), side))
+    work = scheduler.next_work(state(view_of(turned(scene)), side))
     assert isinstance(work, Follow)
     side = scheduler.followed(side, work, side.progress, NOW)
     assert side.changed_at == -math.inf and side.is_answered
-    assert isinstance(scheduler.next_work(situation(side.view, side)), ReturnToFull)
+    assert isinstance(scheduler.next_work(state(side.view, side)), ReturnToFull)
 
 
 def test_a_change_is_begun_unless_it_changes_nothing() -> None:
     scene = mixed_scene()
     side = replace(side_of(view_of(scene)), seconds=3.0, nonfinite=2, pass_paths=5)
-    work = scheduler.next_work(situation(view_of(moved(scene)), side))
+    work = scheduler.next_work(state(view_of(moved(scene)), side))
     assert isinstance(work, Follow)
     same = scheduler.followed(side, work, side.progress, NOW)
     assert same.view is work.view is same.full_view
@@ -225,7 +223,7 @@ def test_both_sides_get_the_same_time_and_an_answer_comes_first() -> None:
     left, main = side_of(view, strategy="restart"), side_of(view)
 
     def turn(main: Side, spent: tuple[float, float], view: View = view) -> Step:
-        work = scheduler.next_work(situation(view, left, main, spent=spent))
+        work = scheduler.next_work(state(view, left, main, spent=spent))
         assert isinstance(work, Step)
         return work
 
@@ -242,11 +240,11 @@ def test_both_sides_get_the_same_time_and_an_answer_comes_first() -> None:
 
 def test_nothing_is_to_do_at_the_target() -> None:
     view = view_of(mixed_scene(), target_spp=2)
-    assert scheduler.next_work(situation(view, side_of(view))) is None
-    assert scheduler.next_work(situation(view, side_of(view, spp=1))) is not None
-    assert scheduler.next_work(situation(view, side_of(view, mode=Mode.INCREMENTAL))) is not None
+    assert scheduler.next_work(state(view, side_of(view))) is None
+    assert scheduler.next_work(state(view, side_of(view, spp=1))) is not None
+    assert scheduler.next_work(state(view, side_of(view, mode=Mode.INCREMENTAL))) is not None
     assert not scheduler.is_done(side_of(view, divisor=2), 2)
-    assert scheduler.next_work(situation(replace(view, target_spp=None, paused=True), side_of(view))) is None
+    assert scheduler.next_work(state(replace(view, target_spp=None, paused=True), side_of(view))) is None
 
 
 # ------------------------------------------------------------------------------------------------- slots
