@@ -33,7 +33,7 @@ class Cursor:
 
 @dataclass(frozen=True, eq=False)
 class Queue:
-    """Tiles in the order in which they are rendered.
+    """Tiles in the order in which they are rendered. Nobody can write to the arrays any more.
 
     tiles     (N,) the order; each tile at most once.
     samples   (N,) paths per pixel of each of them, one at least. Each path per pixel fills a slot.
@@ -44,6 +44,9 @@ class Queue:
     tiles: IntArray
     samples: CountArray
     replaces: bool
+
+    def __post_init__(self) -> None:
+        self.tiles.flags.writeable = self.samples.flags.writeable = False
 
     @classmethod
     def even(cls, tiles: IntArray, samples: int, replaces: bool) -> Queue:

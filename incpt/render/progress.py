@@ -28,7 +28,8 @@ class Progress:
     queue     the tiles that the mode goes through, in order.
     cursor    how far the queue is done.
     tile_spp  (grid.count,) samples of the scene as it is now behind each tile; 0 where the film still shows
-              an old picture, or none. See `Film` for the count that it keeps itself.
+              an old picture, or none. Nobody can write to it any more. See `Film` for the count that it keeps
+              itself.
     """
 
     settings: RenderSettings
@@ -37,6 +38,9 @@ class Progress:
     queue: Queue
     cursor: Cursor
     tile_spp: CountArray
+
+    def __post_init__(self) -> None:
+        self.tile_spp.flags.writeable = False
 
     @classmethod
     def start(cls, settings: RenderSettings, scene: Scene, film: FilmSums) -> Progress:

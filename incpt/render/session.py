@@ -131,8 +131,8 @@ class Session:
 
     @property
     def tile_spp(self) -> npt.NDArray[np.int64]:
-        """(count,) samples behind each tile; 0 where the old picture waits to be thrown away. A step puts
-        another array in its place."""
+        """(count,) samples behind each tile; 0 where the old picture waits to be thrown away. It cannot be
+        written to; a step puts another array in its place."""
         return self.progress.tile_spp
 
     def step(self, slots: int | None = None) -> StepReport:

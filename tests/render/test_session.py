@@ -290,6 +290,18 @@ def test_nor_may_change_before_the_first_step_of_an_edit(device: Device) -> None
     assert (session.tile_spp[report.tiles] == 3).all()
 
 
+def test_nobody_else_writes_to_what_a_session_goes_by(device: Device) -> None:
+    session = rendered(device, mixed_scene(), 1)
+    for _ in range(2):  # at first, and after a step
+        for array in (session.tile_spp, session.queue.tiles, session.queue.samples):
+            with pytest.raises(ValueError, match="read-only"):
+                array[0] = 0
+        session.step()
+    counts = session.spp()
+    counts[:] = 0  # an array of the caller's own
+    assert session.tile_spp.min() > 0
+
+
 def test_step_takes_as_many_slots_as_it_is_given(device: Device, converged: np.ndarray) -> None:
     session = Session(mixed_scene(slots_per_step=1), device=device)
     assert [session.step(slots).paths // 64 for slots in (1, 5, 3, 1000, 24)] == [1, 5, 3, 15, 24]
