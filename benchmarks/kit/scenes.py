@@ -46,7 +46,7 @@ def _made(make: Callable[[], Scene]) -> Scene:
     return make()
 
 
-def matt(r: float, g: float, b: float) -> Material:
+def matte(r: float, g: float, b: float) -> Material:
     """Exactly Lambertian."""
     return Material((r, g, b), specular=0)
 
@@ -72,9 +72,9 @@ def cube(name: str, material: str, position: Vector, rotation: Vector, scale: Ve
 
 
 _BOX_MATERIALS = {
-    "white": matt(0.73, 0.71, 0.68),
-    "red": matt(0.63, 0.06, 0.05),
-    "green": matt(0.14, 0.45, 0.09),
+    "white": matte(0.73, 0.71, 0.68),
+    "red": matte(0.63, 0.06, 0.05),
+    "green": matte(0.14, 0.45, 0.09),
     "lamp": lamp(17, 12, 4),
 }
 
@@ -109,7 +109,7 @@ def cornell() -> Scene:
 def glass() -> Scene:
     """Seven cubes of smooth glass on a dark floor, under a wide lamp and a sky."""
     materials = {
-        "floor": matt(0.25, 0.24, 0.22), "lamp": lamp(4, 3.6, 3),
+        "floor": matte(0.25, 0.24, 0.22), "lamp": lamp(4, 3.6, 3),
         "glass": Material((1, 1, 1), roughness=0, transmission=1, ior=1.5),
     }  # fmt: skip
     objects = [
@@ -126,13 +126,13 @@ def glass() -> Scene:
 
 
 def sphere() -> Scene:
-    """A wavy matt ball of 327,680 triangles in the box, before a board."""
+    """A wavy matte ball of 327,680 triangles in the box, before a board."""
     objects = [
         *_box(),
         plane("board", "white", (0.5, 0.9, -0.75), (70, 0, -25), (0.7, 1, 1.2)),
         Object("ball", wavy_sphere(7), "ball", (-0.1, 0.8, 0.05)),
     ]
-    materials = {**_BOX_MATERIALS, "ball": matt(0.6, 0.6, 0.65)}
+    materials = {**_BOX_MATERIALS, "ball": matte(0.6, 0.6, 0.65)}
     return Scene(Camera((0, 1, 3.6), (0, 1, 0), fov_y=39), Environment(), materials, tuple(objects))
 
 
@@ -142,7 +142,7 @@ def plates() -> Scene:
     height, depth, tilt = (0.75, 0.4, 0.15, 0.0), (-1.1, -0.3, 0.5, 1.3), (21, 13, 7, 1)
     radii = (0.05, 0.12, 0.22, 0.4)
     colours = ((1, 0.6, 0.5), (1, 1, 0.6), (0.5, 1, 0.6), (0.5, 0.7, 1))
-    materials = {"wall": matt(0.4, 0.4, 0.4)}
+    materials = {"wall": matte(0.4, 0.4, 0.4)}
     objects = [
         plane("floor", "wall", (0, -0.4, 0), (0, 0, 0), (8, 1, 8)),
         plane("back", "wall", (0, 1.6, -3.5), (90, 0, 0), (8, 1, 4)),
@@ -176,7 +176,7 @@ def _land(triangles: int) -> Scene:
     """Terrain under a sky."""
     land = Object("terrain", terrain(triangles), "land")
     sky = Environment(color=(0.8, 0.9, 1.0))
-    return Scene(Camera((0, 1.2, 2.2), (0, 0, 0), fov_y=45), sky, {"land": matt(0.6, 0.6, 0.6)}, (land,))
+    return Scene(Camera((0, 1.2, 2.2), (0, 0, 0), fov_y=45), sky, {"land": matte(0.6, 0.6, 0.6)}, (land,))
 
 
 LARGE_SCENES = {
@@ -244,11 +244,11 @@ def crowd(count: int, mesh: Mesh | None = None) -> Scene:
         return pitch * (i % edge + 0.5) - 2, 0.4 * pitch, pitch * (i // edge + 0.5) - 2
 
     objects = [
-        Object(f"{i}", body, "matt", place(i), (0, 37.0 * i % 360, 0), (size, size, size))
+        Object(f"{i}", body, "matte", place(i), (0, 37.0 * i % 360, 0), (size, size, size))
         for i in range(count)
     ]
     floor = plane("floor", "floor", (0, 0, 0), (0, 0, 0), (8, 1, 8))
-    materials = {"matt": matt(0.6, 0.5, 0.4), "floor": matt(0.5, 0.5, 0.5)}
+    materials = {"matte": matte(0.6, 0.5, 0.4), "floor": matte(0.5, 0.5, 0.5)}
     sky = Environment(color=(0.8, 0.9, 1.0))
     return Scene(Camera((0, 2.5, 4.5), (0, 0, 0), fov_y=45), sky, materials, (floor, *objects))
 

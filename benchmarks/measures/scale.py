@@ -15,7 +15,7 @@ from incpt.benchmarks.kit import environment, experiment, options
 from incpt.benchmarks.kit.content import digest
 from incpt.benchmarks.kit.experiment import Outcome, Task, Work
 from incpt.benchmarks.kit.fit import PowerLaw, fitted
-from incpt.benchmarks.kit.scenes import SCENES, crowd, lanterns, matt, plane, terrain
+from incpt.benchmarks.kit.scenes import SCENES, crowd, lanterns, matte, plane, terrain
 from incpt.benchmarks.kit.store import Results, Store, grouped
 from incpt.benchmarks.kit.tables import print_table
 from incpt.benchmarks.kit.timing import interleaved, summary
@@ -50,7 +50,7 @@ def _triangles(count: int, settings: RenderSettings) -> tuple[Scene, RenderSetti
     floor = plane("floor", "ground", (0, -0.3, 0), (0, 0, 0), (8, 1, 8))
     sky = Environment(color=(0.8, 0.9, 1.0))
     camera = Camera((0, 1.2, 2.4), (0, 0, 0), fov_y=45)
-    return Scene(camera, sky, {"ground": matt(0.5, 0.5, 0.45)}, (ground, floor)), settings
+    return Scene(camera, sky, {"ground": matte(0.5, 0.5, 0.45)}, (ground, floor)), settings
 
 
 def _objects(count: int, settings: RenderSettings) -> tuple[Scene, RenderSettings]:

@@ -23,14 +23,14 @@ class MaterialTables:
     """The buffers, by name, and what all materials have in common.
 
     has_media        whether any lets light through
-    is_matt          whether no surface that may be shaded as opaque has a specular layer or is metallic
+    is_matte         whether no surface that may be shaded as opaque has a specular layer or is metallic
     is_media_clear   whether none that lets light through absorbs any of it
     is_media_smooth  whether none that lets light through is rough
     """
 
     buffers: Mapping[str, cl.Buffer]
     has_media: bool
-    is_matt: bool
+    is_matte: bool
     is_media_clear: bool
     is_media_smooth: bool
 
@@ -57,7 +57,7 @@ def material_tables(
     return MaterialTables(
         {"materials": device.upload(rows), "layers": device.upload(layers)},
         has_media=bool(media),
-        is_matt=all(material.specular == material.metallic == 0 for material in opaque),
+        is_matte=all(material.specular == material.metallic == 0 for material in opaque),
         is_media_clear=not any(any(material.absorption) for material in media),
         is_media_smooth=all(material.roughness**2 <= layout.MIN_ALPHA for material in media),
     )

@@ -72,7 +72,7 @@ class SceneTables:
             "FLAT": self._is_flat,
             "SMOOTH_MEDIA": materials.has_media and materials.is_media_smooth,
             "CLEAR_MEDIA": materials.has_media and materials.is_media_clear,
-            "MATTE": materials.is_matt,
+            "MATTE": materials.is_matte,
             "BRUTE_FORCE": top_level.is_brute_force,
         }
         return (*self.features, *(name for name, holds in names.items() if holds))

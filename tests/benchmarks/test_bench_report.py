@@ -75,7 +75,7 @@ def test_scattered_rays_leave_surfaces_in_random_order(tracer: Tracer) -> None:
     assert len(scattered) == 2000
     np.testing.assert_allclose(np.linalg.norm(scattered.directions, axis=1), 1, rtol=1e-5)
     assert np.abs(np.diff(scattered.origins[:, 0])).mean() > 0.3
-    # In a box of matt walls nearly every one meets something: the front alone is open.
+    # In a box of matte walls nearly every one meets something: the front alone is open.
     assert np.isfinite(tracer.place(scattered).result()).mean() > 0.7
 
 

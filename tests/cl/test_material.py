@@ -20,7 +20,7 @@ Array = npt.NDArray[np.floating]
 MATERIALS = {
     "lambert": Material((0.8, 0.5, 0.2), specular=0.0),
     "white lambert": Material((1, 1, 1), specular=0.0),
-    "matt plastic": Material((0.8, 0.3, 0.1), roughness=0.9),
+    "matte plastic": Material((0.8, 0.3, 0.1), roughness=0.9),
     "plastic": Material((0.8, 0.3, 0.1), roughness=0.5),
     "glossy white plastic": Material((1, 1, 1), roughness=0.3),
     "black plastic": Material((0, 0, 0), roughness=0.4),
@@ -235,15 +235,16 @@ def test_no_material_reflects_more_than_arrives() -> None:
 
 @pytest.mark.parametrize("angle_deg", [*ANGLES_DEG, 100.0])
 @pytest.mark.parametrize("name", ["lambert", "white lambert"])
-def test_variant_for_matt_scenes_is_the_same(name: str, angle_deg: float) -> None:
+def test_variant_for_matte_scenes_is_the_same(name: str, angle_deg: float) -> None:
     """Without a layer and metal, what the variant leaves out makes no difference."""
     material, wo = MATERIALS[name], wo_at(angle_deg)
     u, v = uniforms(COUNT // 16, 2, 5)
     wi = direction(np.arccos(1 - 2 * u), 2 * np.pi * v)
-    for general, matt in zip(evaluate(material, wo, wi), evaluate(material, wo, wi, ("MATTE",)), strict=True):
-        assert matt.any() == (angle_deg < 90)
-        np.testing.assert_allclose(matt, general, rtol=1e-5, atol=1e-7)
+    pairs = zip(evaluate(material, wo, wi), evaluate(material, wo, wi, ("MATTE",)), strict=True)
+    for general, variant in pairs:
+        assert variant.any() == (angle_deg < 90)
+        np.testing.assert_allclose(variant, general, rtol=1e-5, atol=1e-7)
     if angle_deg < 90:
         pairs = zip(sample(material, wo, 4096), sample(material, wo, 4096, features=("MATTE",)), strict=True)
-        for general, matt in pairs:
-            np.testing.assert_allclose(matt, general, rtol=1e-4, atol=1e-6)
+        for general, variant in pairs:
+            np.testing.assert_allclose(variant, general, rtol=1e-4, atol=1e-6)

@@ -228,7 +228,7 @@ def test_blocks_of_every_size_make_the_same_picture(make: Callable[[], Scene], d
     np.testing.assert_allclose(images[0], images[1], rtol=1e-5)
 
 
-def test_variant_for_matt_scenes_follows_materials(device: Device) -> None:
+def test_variant_for_matte_scenes_follows_materials(device: Device) -> None:
     box = cornell()
     session = Session(box, size=(8, 8), device=device)
     assert "MATTE" in session._tables.variant

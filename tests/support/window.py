@@ -44,7 +44,7 @@ def require_display() -> None:
 
 
 def table_scene() -> Scene:
-    """A red cube, a blue ball and a grey drum in a row on a matt table, under an even sky."""
+    """A red cube, a blue ball and a grey drum in a row on a matte table, under an even sky."""
     materials = {
         "table": Material((0.6, 0.6, 0.6), specular=0.0),
         "red": Material((0.8, 0.05, 0.05), specular=0.0),

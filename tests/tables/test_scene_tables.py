@@ -30,7 +30,7 @@ from incpt.tables.geometry_pool import GeometryPool
 from incpt.tables.scene_tables import SceneTables, tables_of
 
 MATERIALS = {
-    "matt": Material(specular=0.0),
+    "matte": Material(specular=0.0),
     "lamp": Material(emission=(3, 2, 1)),
     "glass": Material(transmission=1.0),
 }
@@ -73,7 +73,7 @@ def edited(scene: Scene, kind: str, number: int) -> Scene:
         return scene.with_added(placed(free, number))
     whole: dict[str, Callable[[], Scene]] = {
         "remove": lambda: scene.without_object(obj.name),
-        "shine": lambda: scene.with_material("matt", emission=(number % 3, 0, 1)),
+        "shine": lambda: scene.with_material("matte", emission=(number % 3, 0, 1)),
         "tint": lambda: scene.with_material("glass", absorption=(number % 2, 0, 1)),
         "name": lambda: replace(
             scene, materials={f"new {number}": Material(roughness=0.3), **scene.materials}
