@@ -18,7 +18,7 @@ import mitsuba as mi
 import numpy as np
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE.parent))
+sys.path.insert(0, str(HERE.parents[1]))
 
 from support.reference_scenes import REFERENCES, SIZE, Reference  # noqa: E402
 
