@@ -16,10 +16,10 @@ from incpt.render.plan import Cursor, Queue, plan_step
 from incpt.render.session import Session
 from incpt.render.tiles import IntArray, TileGrid
 
-ROWS, PASSES, COPIES = "row by row", "pass after pass", "copies together"
-ORDERS = (ROWS, PASSES, COPIES)
+ROWS, PASSES, TOGETHER = "row by row", "pass after pass", "repetitions together"
+ORDERS = (ROWS, PASSES, TOGETHER)
 """One path per pixel and pass, in rows of the picture or, as BASE and REFINE do it, tile by tile; or all
-copies of a tile together, as INCREMENTAL does it."""
+repetitions of a tile together, as INCREMENTAL does it."""
 
 
 def spiral_tiles(session: Session, steps: int) -> IntArray:
@@ -34,7 +34,7 @@ def ordered_slots(
 ) -> tuple[npt.NDArray[np.void], int]:
     """Slots for the paths of samples 0 ... `samples` - 1 of each pixel of `tiles`, and how many pixels wide
     each slot is."""
-    if order == COPIES:
+    if order == TOGETHER:
         queue = Queue.even(tiles, samples, replaces=True)
         none = np.zeros(grid.count, np.int64)
         return plan_step(grid, queue, Cursor(), len(tiles) * samples, none).slots, grid.tile_size

@@ -29,9 +29,9 @@ from incpt.benchmarks.kit.store import Results, Row, Store, grouped
 from incpt.benchmarks.kit.tables import print_table
 from incpt.benchmarks.kit.timing import interleaved, significant, summary
 from incpt.benchmarks.measures.path_order import (
-    COPIES,
     ORDERS,
     PASSES,
+    TOGETHER,
     OrderedSession,
     ordered_slots,
     pixel_count,
@@ -306,7 +306,7 @@ def _repetition_table(results: Results) -> Table:
 
 def _order_table(results: Results) -> Table:
     title = "million paths per second of the tiles that the spiral reaches first, by the order of paths"
-    return _rate_table(title, order_rates(results), {order: order for order in ORDERS}, COPIES, PASSES)
+    return _rate_table(title, order_rates(results), {order: order for order in ORDERS}, TOGETHER, PASSES)
 
 
 def _rate_table(

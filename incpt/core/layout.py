@@ -392,8 +392,8 @@ MATERIAL = _packed(
 
 SLOT = _packed(
     [
-        # The slots that hold copies of one tile stand next to each other and form a group; paths of
-        # a group go pixel by pixel with the copies innermost, because equal pixels make coherent rays.
+        # The slots that hold repetitions of one tile stand next to each other and form a group; paths of a
+        # group go pixel by pixel with the repetitions innermost, because equal pixels make coherent rays.
         ("tile_x", np.uint32),  # first pixel of the tile
         ("tile_y", np.uint32),
         ("first_sample", np.uint32),  # sample index of the first slot of the group

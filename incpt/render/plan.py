@@ -1,8 +1,8 @@
 """Queues of tiles, and the plan of a step.
 
-The path buffer of a step has room for a number of *slots*, each for one copy of one tile with one path
-per pixel. `plan_step` fills them from a queue of tiles, each repeated as often as the queue says: NoR times
-after a local edit (thesis, sections 3.1 to 3.4):
+The path buffer of a step has room for a number of *slots*, each for one repetition of a tile with one
+path per pixel. `plan_step` fills them from a queue of tiles, each repeated as often as the queue says: NoR
+times after a local edit (thesis, sections 3.1 to 3.4):
 
     tiles completed per step = slots / NoR     (400 x 400 pixels, tile 10, NoR 4: 1600 / 4 = 400)
 
@@ -86,9 +86,9 @@ def plan_step(
     """Fill up to `slot_count` slots from where `cursor` stands in `queue`, but not past its end.
 
     `sample_counts` (grid.count,) is what the film holds of each tile; it must not change while a tile is
-    under way. The copies of a tile in this step form a group of neighbouring slots with consecutive sample
-    indices. Where a tile has more samples than there are slots, its groups follow in the next steps: FIRST
-    marks the group that starts the tile, LAST the one that completes it.
+    under way. The repetitions of a tile in this step form a group of neighbouring slots with consecutive
+    sample indices. Where a tile has more samples than there are slots, its groups follow in the next steps:
+    FIRST marks the group that starts the tile, LAST the one that completes it.
     """
     begin = queue.slots_before(cursor)
     end = min(begin + slot_count, queue.slot_count)

@@ -17,10 +17,10 @@ from incpt.benchmarks.kit.scenes import SCENES
 from incpt.benchmarks.kit.store import Record, Results, Store
 from incpt.benchmarks.measures import steps
 from incpt.benchmarks.measures.path_order import (
-    COPIES,
     ORDERS,
     PASSES,
     ROWS,
+    TOGETHER,
     OrderedSession,
     ordered_slots,
     pixel_count,
@@ -76,9 +76,9 @@ def _places(slots: npt.NDArray[np.void], width_px: int) -> list[tuple[int, int, 
     places = []
     for place in range(len(slots) * width_px**2):
         slot = slots[place // width_px**2]
-        pixel, copy = divmod(place - int(slot["group_first"]) * width_px**2, int(slot["group_count"]))
+        pixel, repetition = divmod(place - int(slot["group_first"]) * width_px**2, int(slot["group_count"]))
         x, y = int(slot["tile_x"]) + pixel % width_px, int(slot["tile_y"]) + pixel // width_px
-        places.append((x, y, int(slot["first_sample"]) + copy))
+        places.append((x, y, int(slot["first_sample"]) + repetition))
     return places
 
 
@@ -86,12 +86,12 @@ def test_orders_have_the_same_paths() -> None:
     grid, tiles = TileGrid(8, 4, 2), np.array([5, 1, 2], np.int32)
     found = {order: _places(*ordered_slots(order, grid, tiles, 3)) for order in ORDERS}
     assert len(found[ROWS]) == 3 * 4 * 3
-    assert sorted(found[ROWS]) == sorted(found[PASSES]) == sorted(found[COPIES])
+    assert sorted(found[ROWS]) == sorted(found[PASSES]) == sorted(found[TOGETHER])
     rows = sorted({(y, x) for x, y, _ in found[ROWS]})
     assert found[ROWS] == [(x, y, sample) for sample in range(3) for y, x in rows]
     assert found[PASSES][:5] == [(2, 2, 0), (3, 2, 0), (2, 3, 0), (3, 3, 0), (2, 0, 0)]
     assert found[PASSES][12:] == [(x, y, sample + 1) for x, y, sample in found[PASSES][:24]]
-    assert found[COPIES][:4] == [(2, 2, 0), (2, 2, 1), (2, 2, 2), (3, 2, 0)]
+    assert found[TOGETHER][:4] == [(2, 2, 0), (2, 2, 1), (2, 2, 2), (3, 2, 0)]
 
 
 def test_pixels_of_tiles_that_are_cut() -> None:
@@ -117,10 +117,10 @@ def test_orders_bring_the_same_radiance() -> None:
         x, y, _ = np.array(_places(slots, width_px)).T
         for total, values in zip(sums[order], radiance, strict=True):
             np.add.at(total, (y, x), values)
-    assert sums[COPIES].max() > 0
+    assert sums[TOGETHER].max() > 0
     # The last bits differ with the lanes and the neighbours of a path.
     for order in (ROWS, PASSES):
-        assert np.isclose(sums[order], sums[COPIES], rtol=1e-4, atol=1e-5).mean() > 0.999
+        assert np.isclose(sums[order], sums[TOGETHER], rtol=1e-4, atol=1e-5).mean() > 0.999
 
 
 # ------------------------------------------------------------------------------------ tables and the whole
@@ -143,7 +143,7 @@ def test_tables_of_what_was_found() -> None:
     found = [_record({}, overheads, measure=steps.OVERHEAD, size=[64, 32])]
     for mode, rates in (("BASE", (1e6, 3e6)), ("INCREMENTAL", (5e6,))):
         found += [_record({"paths_per_second": r}, measure=steps.REPETITION, mode=mode) for r in rates]
-    for order, rate in ((PASSES, 4e6), (COPIES, 6e6)):
+    for order, rate in ((PASSES, 4e6), (TOGETHER, 6e6)):
         found.append(_record({"paths_per_second": rate}, measure=steps.ORDER, order=order))
     overhead, repetition, order_table = _cells(Results({}, tuple(found)))
     assert overhead == [["s", "64 x 32", "BASE", "20.0 ±75 %", "19.0", "10", "50.0"]]

@@ -42,11 +42,11 @@ class MadeUpPaths:
             samples = np.zeros((self.planes, stride), np.float32)
             for place, slot in enumerate(plan.slots):
                 first, count = int(slot["group_first"]), int(slot["group_count"])
-                copy = place - first
+                repetition = place - first
                 for pixel in range(TILE**2):
                     x, y = int(slot["tile_x"]) + pixel % TILE, int(slot["tile_y"]) + pixel // TILE
-                    value = self.value(x, y, int(slot["first_sample"]) + copy)
-                    samples[:, first * TILE**2 + pixel * count + copy] = value
+                    value = self.value(x, y, int(slot["first_sample"]) + repetition)
+                    samples[:, first * TILE**2 + pixel * count + repetition] = value
             params = np.zeros((), layout.PARAMS)
             params["width"], params["height"], params["tile_size"] = WIDTH, HEIGHT, TILE
             params["buffer_stride"] = stride
