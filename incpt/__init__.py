@@ -19,7 +19,7 @@ from incpt.formats.mesh_files import load_mesh
 from incpt.formats.registry import load
 from incpt.formats.scene_save import save
 from incpt.picture.tone_mapping import tone_map
-from incpt.render.first_hits import Aovs
+from incpt.render.first_hits import FirstHits
 from incpt.render.modes import Mode
 from incpt.render.session import Session, StepReport
 from incpt.scene.camera import Camera
@@ -33,12 +33,12 @@ from incpt.scene.shapes import shape
 from incpt.scene.transform import Transform
 
 __all__ = [
-    "Aovs",
     "Camera",
     "Change",
     "Device",
     "DeviceError",
     "Environment",
+    "FirstHits",
     "Image",
     "InputError",
     "InputWarning",

@@ -89,7 +89,7 @@ class App:
         for path in window.take_dropped():
             editor.attempt(lambda path=path: files.drop(editor, path))  # type: ignore[misc]
         if editor.frame is not None and editor.frame is not self.shown_frame:
-            self.display.upload(editor.frame.pictures, editor.frame.aovs)
+            self.display.upload(editor.frame.pictures, editor.frame.first_hits)
             self.shown_frame = editor.frame
         window.begin_frame()
         self._area = take_frame(editor, self.workspace, self.viewport, self.display.overlay())

@@ -189,7 +189,9 @@ def draw_overlays(hand: Hand, spp: int) -> Pixels:
         hand.click("Overlay")
         hand.click(f"Overlay: {overlay}")
         if overlay in ("Object ids", "Normals"):
-            hand.pump(lambda: hand.app.editor.frame is not None and hand.app.editor.frame.aovs is not None)
+            hand.pump(
+                lambda: hand.app.editor.frame is not None and hand.app.editor.frame.first_hits is not None
+            )
         hand.pump(frames=6)
         cells.append((picture(hand), caption))
     return side_by_side(cells)

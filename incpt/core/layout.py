@@ -435,7 +435,7 @@ PARAMS = _packed(
         ("environment_rotation", np.float32),  # as a fraction of a full turn
         ("last_ray", np.uint32),  # number of the ray with which all paths end, see schedule.py
         ("sees_sky", np.uint32),  # 1: light comes from far away
-        ("pixel_center", np.uint32),  # 1: camera rays go through pixel centres (picking, AOVs)
+        ("pixel_center", np.uint32),  # 1: camera rays go through pixel centres (first hits)
     ]
 )
 

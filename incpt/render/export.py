@@ -30,10 +30,10 @@ def write_picture(
         return
     layers: dict[str, Any] = {"RGB": session.image()}
     if with_aovs:
-        aovs = session.aovs()
+        hits = session.first_hits()
         # Object ids are unsigned in OpenEXR; the largest one stands for "none".
-        layers |= {"depth.Z": aovs.depth, "object_id": aovs.object_id.view("uint32")}
+        layers |= {"depth.Z": hits.depth, "object_id": hits.object_id.view("uint32")}
         has_passes = session.settings.aovs
-        layers["albedo.RGB"] = session.pass_image("albedo") if has_passes else aovs.albedo
-        layers["normal.XYZ"] = session.pass_image("normal") if has_passes else aovs.normal
+        layers["albedo.RGB"] = session.pass_image("albedo") if has_passes else hits.albedo
+        layers["normal.XYZ"] = session.pass_image("normal") if has_passes else hits.normal
     images.write_exr(path, layers)

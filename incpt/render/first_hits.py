@@ -1,7 +1,7 @@
-"""What the rays through pixel centres meet first: auxiliary images, and picking.
+"""What the rays through pixel centres meet first: as images, and for picking.
 
-These rays are not jittered, so that a pixel has one object and an outline does not flicker. Auxiliary images
-of the jittered samples of the picture itself are passes of the film; see `film`.
+These rays are not jittered, so that a pixel has one object and an outline does not flicker. Base colours and
+normals of the jittered samples of the picture itself are passes of the film; see `film`.
 """
 
 from __future__ import annotations
@@ -24,9 +24,14 @@ _SURFACE_PLANES = 7
 
 
 @dataclass(frozen=True)
-class Aovs:
-    """First-hit values of the rays through pixel centres: index of the object or -1 (H, W), shading normal
-    in world space (H, W, 3), distance from the camera in metres or infinity (H, W), base colour (H, W, 3)."""
+class FirstHits:
+    """What the rays through pixel centres meet first, row 0 on top.
+
+    object_id  (H, W) the object's place in `Scene.objects`, or -1.
+    normal     (H, W, 3) shading normal, world space; 0 where there is no object.
+    depth      (H, W) distance from the camera in metres, or infinity.
+    albedo     (H, W, 3) base colour, linear; 0 where there is no object.
+    """
 
     object_id: npt.NDArray[np.int32]
     normal: npt.NDArray[np.float32]
@@ -40,9 +45,9 @@ def first_hits(
     settings: RenderSettings,
     size: tuple[int, int],
     rows: tuple[int, int] | None = None,
-) -> Aovs:
-    """The auxiliary images of a picture of `size` (width, height), or of its rows from the first of `rows` up
-    to the second only."""
+) -> FirstHits:
+    """Those of a picture of `size` (width, height), or of its rows from the first of `rows` up to the second
+    only."""
     width, whole_height = size
     params = launch_params(tables, settings, size)
     top, bottom = (0, whole_height) if rows is None else rows
@@ -59,7 +64,7 @@ def first_hits(
     plan = plan_step(grid, queue, Cursor(), grid.count, np.zeros(grid.count, np.int64))
     surface, object_ids = _traced(tracer, tables, plan.slots, params)
     surface = surface.reshape(_SURFACE_PLANES, height, width)
-    return Aovs(
+    return FirstHits(
         object_ids.reshape(height, width),
         np.ascontiguousarray(np.moveaxis(surface[:3], 0, 2)),
         surface[3],

@@ -19,7 +19,7 @@ from incpt.core.settings import RenderSettings
 from incpt.device.device import Device
 from incpt.render import first_hits, tiles
 from incpt.render.film import RADIANCE, Film, tile_image
-from incpt.render.first_hits import Aovs
+from incpt.render.first_hits import FirstHits
 from incpt.render.modes import Mode
 from incpt.render.params import launch_params
 from incpt.render.path_buffer import PathBuffer, slots_of
@@ -227,7 +227,7 @@ class Session:
         """(H, W, channels) the picture of a pass of the film: "radiance" is `image`. With the setting `aovs`,
         "albedo" and "normal" (H, W, 3) are the mean base colour and the mean shading normal (world space) of
         what the samples of the picture met first, 0 for those that met nothing. Distance and object have no
-        mean: see `aovs`. Raises InputError for a pass that there is not."""
+        mean: see `first_hits`. Raises InputError for a pass that there is not."""
         passes = {one.name: one for one in self._state.film.passes}
         if name not in passes:
             hint = "" if self.settings.aovs else "; the setting aovs adds albedo and normal"
@@ -240,11 +240,13 @@ class Session:
         """(H, W) samples behind each pixel; 0 where the old picture waits to be thrown away."""
         return tile_image(self.grid, self.tile_spp)
 
-    def aovs(self, size: tuple[int, int] | None = None, rows: tuple[int, int] | None = None) -> Aovs:
-        """Auxiliary images of the scene as it is now along rays through pixel centres, of the session's size
-        or another; see Aovs. `rows`: from the first of them up to the second only. Those of the samples of
-        the picture are passes of the film; see `pass_image`. Raises InputError for a size that no picture has
-        and for rows that are not in it."""
+    def first_hits(
+        self, size: tuple[int, int] | None = None, rows: tuple[int, int] | None = None
+    ) -> FirstHits:
+        """What the rays through pixel centres meet first in the scene as it is now, in a picture of the
+        session's size or another; see FirstHits. `rows`: from the first of them up to the second only. The
+        setting `aovs` has nothing to do with them: it asks for means over the samples of the picture, see
+        `pass_image`. Raises InputError for a size that no picture has and for rows that are not in it."""
         size = self.size if size is None else replace(self.settings, size=size).size
         if rows is not None and not 0 <= rows[0] < rows[1] <= size[1]:
             raise InputError(f"rows: {rows[0]} to {rows[1]} are no rows of {size[1]}; name one at least")

@@ -9,7 +9,7 @@ from dataclasses import fields
 import numpy as np
 
 from incpt.picture.metrics import normalized_rmse
-from incpt.render.first_hits import Aovs
+from incpt.render.first_hits import FirstHits
 from incpt.render.session import Session
 from incpt.viewer.pace import Pace
 from incpt.viewer.scheduler import Side, first_hit_rows, is_reading_due
@@ -74,12 +74,12 @@ class FirstHitReader:
     they come."""
 
     def __init__(self, session: Session, pace: Pace, clock: Callable[[], float]) -> None:
-        self.aovs: Aovs | None = None
+        self.first_hits: FirstHits | None = None
         self.pace = pace
         self._session, self._clock = session, clock
         self._shown: tuple[object, ...] | None = None
         self._wanted: tuple[object, ...] | None = None
-        self._bands: list[Aovs] = []
+        self._bands: list[FirstHits] = []
 
     def advance(self, view: View, main: Side) -> bool:
         """Trace some rows, where any are missing; returns whether all are there."""
@@ -93,11 +93,11 @@ class FirstHitReader:
         top = sum(len(band.depth) for band in self._bands)
         bottom = min(top + rows, height)
         start = self._clock()
-        self._bands.append(self._session.aovs((width, height), (top, bottom)))
+        self._bands.append(self._session.first_hits((width, height), (top, bottom)))
         self._learn(width * (bottom - top), self._clock() - start)
         if bottom < height:
             return False
-        self.aovs, self._shown, self._bands = _joined(self._bands), wanted, []
+        self.first_hits, self._shown, self._bands = _joined(self._bands), wanted, []
         self._wanted = None
         return True
 
@@ -105,6 +105,6 @@ class FirstHitReader:
         self.pace = self.pace.after(rays, seconds)
 
 
-def _joined(bands: list[Aovs]) -> Aovs:
+def _joined(bands: list[FirstHits]) -> FirstHits:
     """First hits of rows that follow each other."""
-    return Aovs(*(np.concatenate([getattr(band, f.name) for band in bands]) for f in fields(Aovs)))
+    return FirstHits(*(np.concatenate([getattr(band, f.name) for band in bands]) for f in fields(FirstHits)))

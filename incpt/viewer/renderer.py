@@ -22,7 +22,7 @@ class Pick:
 
 @dataclass(frozen=True)
 class Export:
-    """Write the picture: .exr is linear radiance, `aovs` adds first-hit layers; .png is tone-mapped as
+    """Write the picture: .exr is linear radiance, `aovs` adds auxiliary images; .png is tone-mapped as
     `exposure` and `curve` say."""
 
     path: Path

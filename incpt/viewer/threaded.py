@@ -85,7 +85,7 @@ class ThreadedRenderer:
     def _is_worth_showing(self, frame: Frame) -> bool:
         """Whether it has a new picture, or new figures after a while."""
         now = time.perf_counter()
-        images = (*(picture.image for picture in frame.pictures), frame.aovs)
+        images = (*(picture.image for picture in frame.pictures), frame.first_hits)
         is_new = len(images) != len(self._images) or any(
             new is not old for new, old in zip(images, self._images, strict=True)
         )

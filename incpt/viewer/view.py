@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.render import tiles
-from incpt.render.first_hits import Aovs
+from incpt.render.first_hits import FirstHits
 from incpt.render.modes import Mode
 from incpt.scene.model import Scene
 
@@ -27,7 +27,7 @@ class View:
     step_ms           what a step aims at.
     drag_nor          the most repetitions of a tile while a drag is under way.
     split             also render under "restart", fed with the same edits.
-    aovs              first-hit images are wanted.
+    first_hits        whether first hits are wanted.
     """
 
     scene: Scene
@@ -39,7 +39,7 @@ class View:
     step_ms: float = 33.0
     drag_nor: int = 16
     split: bool = False
-    aovs: bool = False
+    first_hits: bool = False
 
     @property
     def size(self) -> tuple[int, int]:
@@ -80,7 +80,8 @@ class Frame:
     view         what it shows.
     pictures     the one under the chosen strategy; with a split view that under "restart" before it.
     is_preview   rendered at a reduced resolution, because everything started over and the view does not rest.
-    aovs         first-hit images of the view's size, or smaller while changes stream in.
+    first_hits   those of a picture of the view's size, or smaller while changes stream in; None: not there
+                 yet, or not wanted.
     nonfinite    samples since the last change of the scene that were not finite and count as black.
     resting      paused, or the target is reached: nothing is under way.
     is_pinned    there is a reference to compare with, or there will be once the picture is whole.
@@ -92,7 +93,7 @@ class Frame:
     step_seconds: float
     paths_per_second: float
     device: str
-    aovs: Aovs | None
+    first_hits: FirstHits | None
     nonfinite: int
     resting: bool
     is_pinned: bool = False

@@ -66,7 +66,7 @@ class Viewer:
         self._state = ViewerState(view, (side,), (0.0,), clock())
         self._seats: tuple[_Seat, ...] = (seat,)
         pace = Pace(5e6 if self.device.is_cpu else 5e8)
-        self._first_hits = FirstHitReader(seat.session, pace, clock)
+        self._hits = FirstHitReader(seat.session, pace, clock)
         seat.session.build(on_build)
 
     @property
@@ -240,9 +240,9 @@ class Viewer:
         """Whether all first hits are there that are wanted; some rows more of them, unless an edit waits for
         its answer."""
         view, main = self._state.view, self._main
-        if not view.aovs:
+        if not view.first_hits:
             return True
-        return (main.is_answered or is_idle) and self._first_hits.advance(view, main)
+        return (main.is_answered or is_idle) and self._hits.advance(view, main)
 
     def _frame(self, resting: bool) -> Frame:
         main, view = self._main, self._state.view
@@ -266,7 +266,7 @@ class Viewer:
             step_seconds=self._step_seconds,
             paths_per_second=self._speed,
             device=self.device.name,
-            aovs=self._first_hits.aovs if view.aovs else None,
+            first_hits=self._hits.first_hits if view.first_hits else None,
             nonfinite=sum(side.nonfinite for side in self._state.sides),
             resting=resting,
             is_pinned=self._reference is not None or self._is_pinning,

@@ -42,7 +42,7 @@ def tracer(device: Device) -> Tracer:
 
 def test_camera_rays_are_those_of_the_session(tracer: Tracer, device: Device) -> None:
     scene = SCENES["cornell"].scene
-    depth = Session(scene, (32, 32), device=device).aovs().depth
+    depth = Session(scene, (32, 32), device=device).first_hits().depth
     # Tile by tile of 16 x 16.
     tiles = depth.reshape(2, 16, 2, 16).transpose(0, 2, 1, 3)
     distances = tracer.place(camera_rays(scene.camera, (32, 32))).result()

@@ -75,7 +75,7 @@ def test_render_puts_aovs_into_an_exr(
     scene = registry.load(scene_file)
     session = Session(scene, settings=replace(scene.settings, aovs=True))
     session.render(1)
-    expected = session.aovs()
+    expected = session.first_hits()
     ids = np.asarray(channels["object_id"].pixels)
     np.testing.assert_array_equal(ids.view(np.int32), expected.object_id)
     assert set(np.unique(ids)) == {0, 0xFFFFFFFF}

@@ -93,7 +93,7 @@ def test_values_are_those_of_the_same_rays_as_radiance(device: Device) -> None:
 @pytest.mark.parametrize("in_blocks", [True, False])
 def test_inside_of_objects_they_are_those_of_pixel_centres(device: Device, in_blocks: bool) -> None:
     session = rendered(device, mixed_scene(), 8, in_blocks)
-    expected = session.aovs()
+    expected = session.first_hits()
     ids, inside = expected.object_id, np.zeros((28, 44), bool)
     inside[2:-2, 2:-2] = True
     for dy in range(-2, 3):

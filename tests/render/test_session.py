@@ -366,7 +366,7 @@ def test_no_kernel_is_built_after_building(
             session.edit(moved(scene))
             session.render(17)
             session.image()
-            session.aovs()
+            session.first_hits()
             assert session.pick((22, 14)) == "red cube"
             session.build(lambda *_: pytest.fail("is built already"))
         assert_same(session.image(), rendered(device, moved(scene), 17).image())
@@ -516,7 +516,7 @@ def test_picks_what_is_under_a_point(device: Device) -> None:
     for y in range(0, 28, 3):
         for x in range(0, 44, 5):
             assert session.pick_point(((x + 0.5) / 44, (y + 0.5) / 28)) == session.pick((x, y))
-    ids, names = session.aovs().object_id, [obj.name for obj in session.scene.objects]
+    ids, names = session.first_hits().object_id, [obj.name for obj in session.scene.objects]
     for y in range(0, 28, 3):
         for x in range(0, 44, 5):
             assert session.pick((x, y)) == (names[ids[y, x]] if ids[y, x] >= 0 else None)
@@ -531,49 +531,49 @@ def test_pick_keeps_the_picture(device: Device) -> None:
     session = rendered(device, mixed_scene(), 2)
     before = session.image()
     session.pick((5, 5))
-    session.aovs()
+    session.first_hits()
     np.testing.assert_array_equal(session.image(), before)
     session.render(4)
     assert_same(session.image(), rendered(device, mixed_scene(), 4).image())
 
 
-def test_aovs_may_have_another_size(device: Device) -> None:
+def test_first_hits_may_have_another_size(device: Device) -> None:
     session = rendered(device, mixed_scene(), 1)
-    small = session.aovs((11, 7))
+    small = session.first_hits((11, 7))
     assert small.depth.shape == (7, 11) and small.normal.shape == (7, 11, 3)
     np.testing.assert_array_equal(
-        small.object_id, Session(mixed_scene(size=(11, 7)), device=device).aovs().object_id
+        small.object_id, Session(mixed_scene(size=(11, 7)), device=device).first_hits().object_id
     )
 
 
-def test_aovs_come_by_rows_too(device: Device) -> None:
+def test_first_hits_come_by_rows_too(device: Device) -> None:
     session = Session(mixed_scene(), device=device)
-    whole = session.aovs()
+    whole = session.first_hits()
     for rows in ((0, 3), (3, 20), (20, 28)):
-        part = session.aovs(rows=rows)
+        part = session.first_hits(rows=rows)
         np.testing.assert_array_equal(part.object_id, whole.object_id[slice(*rows)])
         np.testing.assert_allclose(part.depth, whole.depth[slice(*rows)], rtol=1e-4)
         np.testing.assert_allclose(part.normal, whole.normal[slice(*rows)], atol=1e-3)
 
 
-def test_aovs_describe_first_hits(device: Device) -> None:
+def test_first_hits_are_those_of_pixel_centres(device: Device) -> None:
     session = Session(mixed_scene(), device=device)
-    aovs = session.aovs()
+    hits = session.first_hits()
     names = [o.name for o in session.scene.objects]
-    assert names[aovs.object_id[14, 22]] == "red cube" == session.pick((22, 14))
-    assert aovs.object_id[0, 0] == -1 and np.isinf(aovs.depth[0, 0]) and not aovs.normal[0, 0].any()
-    assert names[aovs.object_id[26, 2]] == "floor"
-    np.testing.assert_allclose(aovs.normal[26, 2], (0, 1, 0), atol=1e-6)
-    np.testing.assert_allclose(aovs.albedo[14, 22], (0.8, 0.1, 0.1), atol=1e-6)
-    hit = aovs.object_id >= 0
-    np.testing.assert_allclose(np.linalg.norm(aovs.normal[hit], axis=1), 1, atol=1e-5)
+    assert names[hits.object_id[14, 22]] == "red cube" == session.pick((22, 14))
+    assert hits.object_id[0, 0] == -1 and np.isinf(hits.depth[0, 0]) and not hits.normal[0, 0].any()
+    assert names[hits.object_id[26, 2]] == "floor"
+    np.testing.assert_allclose(hits.normal[26, 2], (0, 1, 0), atol=1e-6)
+    np.testing.assert_allclose(hits.albedo[14, 22], (0.8, 0.1, 0.1), atol=1e-6)
+    hit = hits.object_id >= 0
+    np.testing.assert_allclose(np.linalg.norm(hits.normal[hit], axis=1), 1, atol=1e-5)
     # The floor lies 1.4 m below the camera: distance along the ray from its angle.
     height, half = 1.4, np.tan(np.radians(21))
     y = (1 - 2 * (26.5 / 28)) * half
     x = (2 * (2.5 / 44) - 1) * half * 44 / 28
     pitch = np.arctan2(-0.9, 4.2)
     down = -(np.sin(pitch) + y * np.cos(pitch)) / np.sqrt(1 + x * x + y * y)
-    np.testing.assert_allclose(aovs.depth[26, 2], height / down, rtol=1e-4)
+    np.testing.assert_allclose(hits.depth[26, 2], height / down, rtol=1e-4)
 
 
 def test_empty_scene_is_the_environment(device: Device) -> None:
@@ -607,7 +607,7 @@ def test_triangles_on_top_look_like_objects(
     difference = np.abs(session.image() - expected.image())
     assert np.median(difference) < 1e-5
     assert session.image().mean() == pytest.approx(expected.image().mean(), rel=1e-2)
-    actual, wanted = session.aovs(), expected.aovs()
+    actual, wanted = session.first_hits(), expected.first_hits()
     same = actual.object_id == wanted.object_id
     assert same.mean() > 0.999
     np.testing.assert_allclose(actual.normal[same], wanted.normal[same], atol=1e-3)
@@ -627,7 +627,7 @@ def test_rows_that_no_picture_has_are_refused(device: Device) -> None:
     session = Session(mixed_scene(), device=device)
     for rows in ((5, 2), (0, 0), (-3, 5), (0, 1000)):
         with pytest.raises(InputError, match="are no rows of 28; name one at least"):
-            session.aovs(rows=rows)
+            session.first_hits(rows=rows)
     for size in ((0, 5), (10**6, 10**6)):
         with pytest.raises(InputError, match="size"):
-            session.aovs(size)
+            session.first_hits(size)

@@ -66,7 +66,7 @@ def test_a_sheared_object_is_the_object_with_sheared_vertices(mirror: npt.NDArra
 def test_first_hits_and_normals_under_shear(mirror: npt.NDArray[np.float64]) -> None:
     scene = sheared(mirror)
     plain = replace(scene, objects=tuple(baked(obj) for obj in scene.objects))
-    found, expected = (Session(one, SIZE, RenderSettings(), device()).aovs() for one in (scene, plain))
+    found, expected = (Session(one, SIZE, RenderSettings(), device()).first_hits() for one in (scene, plain))
     same = found.object_id == expected.object_id
     assert same.mean() > 0.99 and set(np.unique(found.object_id)) >= set(range(len(scene.objects) - 1))
     np.testing.assert_allclose(found.depth[same], expected.depth[same], rtol=1e-4)
@@ -81,9 +81,9 @@ def test_a_sheared_object_is_picked_where_it_is_seen() -> None:
     leaning[0, :3] += 0.8 * leaning[1, :3]
     leaning[:, 3] += [0.8 * cube.position[1] / 2, 0, 0]
     session = Session(scene, SIZE, RenderSettings(), device())
-    before = session.aovs().object_id == 1
+    before = session.first_hits().object_id == 1
     session.edit(scene.with_object("red cube", matrix=leaning))
-    after = session.aovs().object_id == 1
+    after = session.first_hits().object_id == 1
     rows = np.flatnonzero(before.any(axis=1) & after.any(axis=1))
     middle = [np.flatnonzero(image[rows[1]]).mean() for image in (before, after)]
     assert middle[1] > middle[0] + 2

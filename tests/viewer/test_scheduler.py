@@ -95,7 +95,7 @@ def test_an_edit_is_taken_up_once_the_one_before_is_answered() -> None:
 def test_an_equal_view_is_nothing_new() -> None:
     scene = mixed_scene()
     side = side_of(view_of(scene))
-    same = view_of(replace(scene), target_spp=9, step_ms=20.0, drag_nor=3, aovs=True)
+    same = view_of(replace(scene), target_spp=9, step_ms=20.0, drag_nor=3, first_hits=True)
     assert scheduler.shows(side, same)
     for other in (view_of(moved(scene)), view_of(scene, before=scene), view_of(scene, resolution_scale=0.5)):
         assert not scheduler.shows(side, other)

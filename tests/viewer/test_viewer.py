@@ -351,22 +351,22 @@ def test_first_hits_come_when_wanted_and_small_while_moving(
 ) -> None:
     scene = mixed_scene()
     viewer, _ = make_viewer(view_of(scene, target_spp=1))
-    assert all(frame.aovs is None for frame in frames_until_rest(viewer, view_of(scene, target_spp=1)))
-    still = view_of(scene, target_spp=1, aovs=True)
+    assert all(frame.first_hits is None for frame in frames_until_rest(viewer, view_of(scene, target_spp=1)))
+    still = view_of(scene, target_spp=1, first_hits=True)
     frame = frames_until_rest(viewer, still)[-1]
-    assert frame.aovs is not None and frame.aovs.depth.shape == (28, 44)
-    np.testing.assert_array_equal(frame.aovs.object_id, viewer.session.aovs().object_id)
+    assert frame.first_hits is not None and frame.first_hits.depth.shape == (28, 44)
+    np.testing.assert_array_equal(frame.first_hits.object_id, viewer.session.first_hits().object_id)
     # Only rendering moves this clock: say that the rays of first hits are slow too.
-    viewer._first_hits.pace = Pace(60_000.0)
-    monkeypatch.setattr(viewer._first_hits, "_learn", lambda *_: None)
-    view = view_of(moved(scene), before=scene, aovs=True)
+    viewer._hits.pace = Pace(60_000.0)
+    monkeypatch.setattr(viewer._hits, "_learn", lambda *_: None)
+    view = view_of(moved(scene), before=scene, first_hits=True)
     moving = run_to(viewer, view, lambda frame: frame.view == view and bool(frame.pictures[0].replaced.any()))
-    assert moving.aovs is not None and moving.aovs.depth.shape[0] < 28
-    assert moving.aovs is not frame.aovs
-    end = view_of(moved(scene), aovs=True, target_spp=17)
-    last = frames_until_rest(viewer, end)[-1].aovs
+    assert moving.first_hits is not None and moving.first_hits.depth.shape[0] < 28
+    assert moving.first_hits is not frame.first_hits
+    end = view_of(moved(scene), first_hits=True, target_spp=17)
+    last = frames_until_rest(viewer, end)[-1].first_hits
     assert last is not None and last.depth.shape == (28, 44)
-    np.testing.assert_array_equal(last.object_id, viewer.session.aovs().object_id)
+    np.testing.assert_array_equal(last.object_id, viewer.session.first_hits().object_id)
 
 
 def test_picks_by_point(make_viewer: MakeViewer) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import moderngl
 
-from incpt.render.first_hits import Aovs
+from incpt.render.first_hits import FirstHits
 from incpt.ui.display import shaders
 from incpt.ui.display.outline import Outline, Outlined
 from incpt.ui.display.overlays import Overlay
@@ -41,11 +41,11 @@ class Display:
         self._arrays = {p: context.vertex_array(p, []) for p in self._programs}
         self.outline = Outline(context)
         self._sides: list[PictureTextures] = []
-        self._aovs: Aovs | None = None
+        self._first_hits: FirstHits | None = None
         self.background = (0.11, 0.11, 0.115)
         """Colour of pixels that have no sample yet and nothing to show instead, sRGB."""
 
-    def upload(self, pictures: Sequence[Picture], aovs: Aovs | None = None) -> None:
+    def upload(self, pictures: Sequence[Picture], first_hits: FirstHits | None = None) -> None:
         """Take the pictures of a Frame; what is the same as before is not sent again.
 
         When the size of a picture changes, the last complete one of the other size (the preview of a camera
@@ -57,12 +57,12 @@ class Display:
             self._sides.pop(0).release()
         for side, picture in zip(self._sides, pictures, strict=True):
             side.upload(picture)
-        self._aovs = aovs
+        self._first_hits = first_hits
 
     def forget(self) -> None:
         """Drop the pictures: nothing of them may show through the next, of another scene."""
         self.upload(())
-        self._aovs = None
+        self._first_hits = None
 
     def overlay(self, side: int = -1) -> Overlay | None:
         """The overlay of a side as it was drawn last, for its legend and numbers; see `overlays.Overlay`."""
@@ -98,7 +98,7 @@ class Display:
             self._map(side, settings)
             if settings.tile_grid:
                 self._measure_tiles(side)
-            side.lay_over(settings.overlay, self._aovs)
+            side.lay_over(settings.overlay, self._first_hits)
         target.use()
         context.scissor = None
         for side, part in shown:

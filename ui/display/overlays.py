@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from incpt.render.first_hits import Aovs
+from incpt.render.first_hits import FirstHits
 from incpt.viewer.view import Picture
 
 Pixels = npt.NDArray[np.uint8]
@@ -17,8 +17,8 @@ Pixels = npt.NDArray[np.uint8]
 Color = tuple[int, int, int]
 """sRGB, 0 to 255."""
 
-NEEDS_AOVS = frozenset({"object_ids", "normals", "albedo", "depth"})
-"""Overlays that want first-hit images: a View with `aovs`."""
+NEEDS_FIRST_HITS = frozenset({"object_ids", "normals", "albedo", "depth"})
+"""Overlays of first hits: they want a View with `first_hits`."""
 
 _DONE_ALPHA, _WAITING_ALPHA = 90, 255
 """Opacity of tiles that the queue has passed and of those that wait, 0 to 255."""
@@ -62,8 +62,8 @@ class Overlay:
     numbers_at: npt.NDArray[np.float64] | None = None
 
 
-def build(kind: str, picture: Picture, aovs: Aovs | None) -> Overlay | None:
-    """The overlay of that kind, one of preferences.OVERLAYS. None for "none", and where first-hit images are
+def build(kind: str, picture: Picture, first_hits: FirstHits | None) -> Overlay | None:
+    """The overlay of that kind, one of preferences.OVERLAYS. None for "none", and where first hits are
     wanted that are not there yet."""
     if kind == "queue":
         return _queue(picture)
@@ -71,10 +71,10 @@ def build(kind: str, picture: Picture, aovs: Aovs | None) -> Overlay | None:
         return _replaced(picture)
     if kind == "spp":
         return _spp(picture)
-    if aovs is None or kind not in NEEDS_AOVS:
+    if first_hits is None or kind not in NEEDS_FIRST_HITS:
         return None
     height, width = picture.image.shape[:2]
-    image, legend = _PER_PIXEL[kind](aovs)
+    image, legend = _PER_PIXEL[kind](first_hits)
     return Overlay(image, (width, height), legend)
 
 
@@ -140,44 +140,44 @@ def _of_tiles(
     return Overlay(image.reshape(grid.rows, grid.columns, 4), extent, legend, numbers, numbers_at)
 
 
-def _object_ids(aovs: Aovs) -> tuple[Pixels, tuple[tuple[str, Color], ...]]:
-    ids = aovs.object_id
+def _object_ids(hits: FirstHits) -> tuple[Pixels, tuple[tuple[str, Color], ...]]:
+    ids = hits.object_id
     colors = np.zeros((int(ids.max(initial=-1)) + 2, 4), np.uint8)
     colors[1:, :3] = object_colors(len(colors) - 1)
     colors[1:, 3] = 255
     return colors[ids + 1], ()
 
 
-def _normals(aovs: Aovs) -> tuple[Pixels, tuple[tuple[str, Color], ...]]:
-    rgb = np.rint(aovs.normal * 127.5 + 127.5).astype(np.uint8)
+def _normals(hits: FirstHits) -> tuple[Pixels, tuple[tuple[str, Color], ...]]:
+    rgb = np.rint(hits.normal * 127.5 + 127.5).astype(np.uint8)
     axes = (("+x", (255, 128, 128)), ("+y", (128, 255, 128)), ("+z", (128, 128, 255)))
-    return _of_hits(aovs, rgb), axes
+    return _of_hits(hits, rgb), axes
 
 
-def _albedo(aovs: Aovs) -> tuple[Pixels, tuple[tuple[str, Color], ...]]:
-    return _of_hits(aovs, _srgb8(aovs.albedo)), ()
+def _albedo(hits: FirstHits) -> tuple[Pixels, tuple[tuple[str, Color], ...]]:
+    return _of_hits(hits, _srgb8(hits.albedo)), ()
 
 
-def _depth(aovs: Aovs) -> tuple[Pixels, tuple[tuple[str, Color], ...]]:
+def _depth(hits: FirstHits) -> tuple[Pixels, tuple[tuple[str, Color], ...]]:
     """On a logarithmic scale, near is bright. The farthest hundredth (a floor's horizon) shares a colour."""
-    hit = np.isfinite(aovs.depth)
+    hit = np.isfinite(hits.depth)
     if not hit.any():
-        return _of_hits(aovs, np.zeros((*aovs.depth.shape, 3), np.uint8)), ()
-    near, far = np.maximum(np.percentile(aovs.depth[hit], _DEPTH_PERCENTILES), 1e-6)
+        return _of_hits(hits, np.zeros((*hits.depth.shape, 3), np.uint8)), ()
+    near, far = np.maximum(np.percentile(hits.depth[hit], _DEPTH_PERCENTILES), 1e-6)
     far = max(far, near * 1.01)
-    depth = np.clip(np.where(hit, aovs.depth, far), near, far)
+    depth = np.clip(np.where(hit, hits.depth, far), near, far)
     shades = color_map(VIRIDIS, np.linspace(1.0, 0.0, 256))
     rgb = shades[np.rint(_log_place(depth, near, far) * 255.0).astype(np.uint8)]
     steps = [(f"{d:.3g} m", 1.0 - float(_log_place(d, near, far))) for d in np.geomspace(near, far, 5)]
-    return _of_hits(aovs, rgb), _legend(VIRIDIS, steps)
+    return _of_hits(hits, rgb), _legend(VIRIDIS, steps)
 
 
 _PER_PIXEL = {"object_ids": _object_ids, "normals": _normals, "albedo": _albedo, "depth": _depth}
 """The overlays that are made from first hits, by kind."""
 
 
-def _of_hits(aovs: Aovs, rgb: Pixels) -> Pixels:
-    alpha = np.where(aovs.object_id >= 0, np.uint8(255), np.uint8(0))
+def _of_hits(hits: FirstHits, rgb: Pixels) -> Pixels:
+    alpha = np.where(hits.object_id >= 0, np.uint8(255), np.uint8(0))
     return np.concatenate([rgb, alpha[..., None]], axis=-1)
 
 

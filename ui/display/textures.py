@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from incpt.render.first_hits import Aovs
+from incpt.render.first_hits import FirstHits
 from incpt.render.tiles import TileGrid
 from incpt.ui.display import overlays
 from incpt.ui.display.overlays import Overlay
@@ -33,7 +33,7 @@ class PictureTextures:
         self.overlay: Overlay | None = None
         self.overlay_texture: moderngl.Texture | None = None
         self.overlay_of: tuple[str, tuple[int, ...]] | None = None
-        self.overlay_source: Picture | Aovs | None = None
+        self.overlay_source: Picture | FirstHits | None = None
 
     @property
     def aspect(self) -> float:
@@ -75,13 +75,13 @@ class PictureTextures:
             self.underlay.repeat_x = self.underlay.repeat_y = False
             self.underlay.filter = (moderngl.LINEAR, moderngl.LINEAR)
 
-    def lay_over(self, kind: str, aovs: Aovs | None) -> None:
+    def lay_over(self, kind: str, first_hits: FirstHits | None) -> None:
         """Makes the overlay texture that of `kind`, unless it is there already."""
         assert self.picture is not None
-        source = aovs if kind in overlays.NEEDS_AOVS else self.picture
+        source = first_hits if kind in overlays.NEEDS_FIRST_HITS else self.picture
         if self.overlay_of == (kind, self.picture.image.shape) and self.overlay_source is source:
             return
-        self.overlay = overlays.build(kind, self.picture, aovs)
+        self.overlay = overlays.build(kind, self.picture, first_hits)
         self.overlay_of, self.overlay_source = (kind, self.picture.image.shape), source
         if self.overlay is None:
             return

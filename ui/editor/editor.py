@@ -16,7 +16,7 @@ from pathlib import Path
 from incpt.core.errors import DeviceError, InputError, OutputError, one_line
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
-from incpt.ui.display.overlays import NEEDS_AOVS
+from incpt.ui.display.overlays import NEEDS_FIRST_HITS
 from incpt.ui.editor.dialog import Answer, Dialog
 from incpt.ui.editor.document import Document
 from incpt.ui.editor.notices import Notices
@@ -168,7 +168,7 @@ class Editor:
             step_ms=self.preferences.step_ms,
             drag_nor=self.preferences.drag_nor,
             split=display.split,
-            aovs=display.overlay in NEEDS_AOVS,
+            first_hits=display.overlay in NEEDS_FIRST_HITS,
         )
 
     def resize_viewport(self, size: tuple[int, int] | None) -> None:

@@ -16,7 +16,7 @@ from incpt import Session
 from incpt.device.device import Device
 from incpt.picture.tone_mapping import CURVES, tone_map
 from incpt.render import tiles
-from incpt.render.first_hits import Aovs
+from incpt.render.first_hits import FirstHits
 from incpt.render.modes import Mode
 from incpt.scene.model import Scene
 from incpt.ui.display import overlays
@@ -232,18 +232,18 @@ def test_tile_lines_contrast_with_what_they_cross_and_fade_when_dense(screen: An
     ).all()
 
 
-def first_hits(width: int, height: int) -> Aovs:
+def first_hits(width: int, height: int) -> FirstHits:
     ids = np.random.default_rng(3).integers(-1, 5, (height, width)).astype(np.int32)
     shape = (height, width)
-    return Aovs(ids, np.zeros((*shape, 3), np.float32), np.ones(shape, np.float32), np.ones((*shape, 3)))
+    return FirstHits(ids, np.zeros((*shape, 3), np.float32), np.ones(shape, np.float32), np.ones((*shape, 3)))
 
 
 def test_overlays_lie_on_their_pixels_and_blend(screen: Any) -> None:
-    shown, aovs = picture(noise(44, 28), tile_size=9), first_hits(44, 28)
+    shown, hits = picture(noise(44, 28), tile_size=9), first_hits(44, 28)
     window, rect = screen(88, 56), Rect(0, 0, 88, 56)
-    window.display.upload([shown], aovs)
+    window.display.upload([shown], hits)
     for kind in ("object_ids", "queue"):
-        overlay = overlays.build(kind, shown, aovs)
+        overlay = overlays.build(kind, shown, hits)
         assert overlay is not None
         image = overlay.image
         if kind == "queue":
@@ -329,7 +329,7 @@ def mask_at(window: Screen, rect: Rect[float], selection: Outlined) -> npt.NDArr
     ids=["cube", "mirrored", "ball", "tilted", "floor", "from inside", "behind the camera too"],
 )
 def test_the_mask_is_what_the_path_tracer_sees(screen: Any, device: Device, scene: Scene) -> None:
-    seen = Session(scene, device=device).aovs().object_id >= 0
+    seen = Session(scene, device=device).first_hits().object_id >= 0
     window = screen(96, 64)
     window.display.upload([picture(noise(96, 64))])
     name = scene.objects[0].name
@@ -340,7 +340,7 @@ def test_the_mask_is_what_the_path_tracer_sees(screen: Any, device: Device, scen
 
 def test_the_mask_follows_zoom_and_pan(screen: Any, device: Device) -> None:
     scene = lone("grey drum")
-    seen = Session(scene, size=(384, 256), device=device).aovs().object_id >= 0
+    seen = Session(scene, size=(384, 256), device=device).first_hits().object_id >= 0
     window = screen(120, 90)
     window.display.upload([picture(noise(96, 64))])
     mask = mask_at(window, Rect(-70, -110, 384, 256), outlined(scene, "grey drum")) > 0

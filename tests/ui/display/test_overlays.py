@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from incpt.render import tiles
-from incpt.render.first_hits import Aovs
+from incpt.render.first_hits import FirstHits
 from incpt.render.modes import Mode
 from incpt.ui.display import overlays
 from incpt.ui.preferences import OVERLAYS
@@ -34,24 +34,24 @@ def picture(**changes: Any) -> Picture:
     return Picture(**{**values, **changes})
 
 
-def aovs() -> Aovs:
+def first_hits() -> FirstHits:
     ids = np.full((HEIGHT, WIDTH), -1, np.int32)
     ids[10:, :20], ids[10:, 20:] = 0, 3
     hit = ids >= 0
     normal = np.where(hit[..., None], np.float32([0, 1, 0]), np.float32(0))
     depth = np.where(hit, np.linspace(1, 10, WIDTH, dtype=np.float32), np.float32(np.inf))
     albedo = np.where(hit[..., None], np.float32([0.5, 0.18, 0]), np.float32(0))
-    return Aovs(ids, normal, depth, albedo)
+    return FirstHits(ids, normal, depth, albedo)
 
 
 @pytest.mark.parametrize("kind", OVERLAYS)
 def test_every_kind_fits_the_picture(kind: str) -> None:
-    overlay = overlays.build(kind, picture(), aovs())
+    overlay = overlays.build(kind, picture(), first_hits())
     if kind == "none":
         assert overlay is None
         return
     assert overlay is not None and overlay.image.dtype == np.uint8 and overlay.image.any()
-    per_pixel = kind in overlays.NEEDS_AOVS
+    per_pixel = kind in overlays.NEEDS_FIRST_HITS
     assert overlay.image.shape == ((HEIGHT, WIDTH, 4) if per_pixel else (GRID.rows, GRID.columns, 4))
     assert overlay.extent_px == ((WIDTH, HEIGHT) if per_pixel else (GRID.columns * TILE, GRID.rows * TILE))
     assert overlays.build(kind, picture(), None) is None or not per_pixel
@@ -104,14 +104,14 @@ def test_samples_that_hardly_differ_look_alike() -> None:
 
 
 def test_the_sky_is_left_alone_by_first_hit_overlays() -> None:
-    for kind in overlays.NEEDS_AOVS:
-        overlay = overlays.build(kind, picture(), aovs())
+    for kind in overlays.NEEDS_FIRST_HITS:
+        overlay = overlays.build(kind, picture(), first_hits())
         assert overlay is not None
-        assert ((overlay.image[..., 3] > 0) == (aovs().object_id >= 0)).all()
+        assert ((overlay.image[..., 3] > 0) == (first_hits().object_id >= 0)).all()
 
 
 def test_first_hit_values() -> None:
-    built = {kind: overlays.build(kind, picture(), aovs()) for kind in overlays.NEEDS_AOVS}
+    built = {kind: overlays.build(kind, picture(), first_hits()) for kind in overlays.NEEDS_FIRST_HITS}
     at = {kind: overlay.image[20, 5, :3].tolist() for kind, overlay in built.items() if overlay is not None}
     assert at["normals"] == [128, 255, 128]
     assert at["albedo"] == [188, 118, 0]
@@ -124,13 +124,13 @@ def test_first_hit_values() -> None:
 
 
 def test_a_picture_of_nothing_has_overlays() -> None:
-    empty = Aovs(
+    empty = FirstHits(
         np.full((HEIGHT, WIDTH), -1, np.int32),
         np.zeros((HEIGHT, WIDTH, 3), np.float32),
         np.full((HEIGHT, WIDTH), np.inf, np.float32),
         np.zeros((HEIGHT, WIDTH, 3), np.float32),
     )
-    for kind in overlays.NEEDS_AOVS:
+    for kind in overlays.NEEDS_FIRST_HITS:
         overlay = overlays.build(kind, picture(), empty)
         assert overlay is not None and not overlay.image[..., 3].any()
 

@@ -84,7 +84,7 @@ def test_display_never_changes_the_scene_that_is_shown(user: Desk) -> None:
         user.run(name)
     assert user.editor.view == before and all(view == before for view in user.null.views)
     user.run("Normals")
-    assert user.editor.view == replace(before, aovs=True)
+    assert user.editor.view == replace(before, first_hits=True)
     user.run("None")
     user.run("Split view")
     assert user.editor.view == replace(before, split=True)
