@@ -16,6 +16,12 @@ from incpt.scene.model import Object, Scene
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
+SMALLEST_AREA = 1e-18
+"""Square metres in world space from which on triangles are lights. In single precision a smaller one has no
+normal, and where all are that small the density of a point has no end."""
+SMALLEST_WEIGHT = float(np.finfo(np.float32).tiny)
+"""The least `radiant_weight` of lights: in single precision less is black."""
+
 
 def luminance(color: npt.ArrayLike) -> npt.NDArray[np.float64]:
     """Rec. 709 luminance of linear colours (..., 3)."""
@@ -29,11 +35,10 @@ def radiant_weight(material: Material) -> float:
 
 @dataclass(frozen=True, eq=False)
 class TriangleLights:
-    """`planes` (len(LightPlane), N) float32, uints bit for bit; `total` is the sum of area times
-    `radiant_weight`."""
+    """`planes` (len(LightPlane), N) float32, uints bit for bit; `densities` as in LightTables."""
 
     planes: npt.NDArray[np.float32]
-    total: float
+    densities: Mapping[str, float]
 
     @property
     def count(self) -> int:
@@ -45,13 +50,14 @@ class LightTables:
     """The buffers, by name, and how light sampling chooses.
 
     count                    how many triangles there are to choose from
-    density_scale            density per area of choosing a point on a triangle, over its `radiant_weight`
+    densities                density per area of choosing a point, by the name of its material. Others have 0:
+                             their points are left to the rays that meet them
     environment_probability  the chance that light sampling turns to the environment's image
     """
 
     buffers: Mapping[str, cl.Buffer]
     count: int
-    density_scale: float
+    densities: Mapping[str, float]
     environment_probability: float
 
 
@@ -64,64 +70,56 @@ def light_tables(device: Device, scene: Scene, has_image: bool) -> LightTables:
     return LightTables(
         {"lights": device.upload(table.planes)},
         table.count,
-        density_scale=share / table.total if table.count else 0.0,
+        densities=table.densities,
         environment_probability=1.0 - share if has_image else 0.0,
     )
 
 
 def triangle_lights(scene: Scene, share: float) -> TriangleLights:
-    """Every visible emissive triangle that has an area. `share` is the chance that light sampling turns to
-    triangles at all; the densities contain it."""
-    corners, emission, weights, double_sided = [], [], [], []
-    for obj in _emissive_objects(scene):
-        material = scene.materials[obj.material]
-        # A mirrored face keeps its outside: two corners change places to keep it on the normal's side.
-        mirrored = np.linalg.det(obj.world_from_object[:, :3]) < 0
-        faces = obj.mesh.faces[:, [0, 2, 1]] if mirrored else obj.mesh.faces
-        corners.append(affine.apply(obj.world_from_object, obj.mesh.vertices)[faces])
-        emission.append(np.broadcast_to(material.emission, (len(faces), 3)))
-        weights.append(np.full(len(faces), radiant_weight(material)))
-        double_sided.append(np.full(len(faces), material.double_sided))
-    if not corners:
-        return TriangleLights(np.zeros((len(layout.LightPlane), 0), np.float32), 0.0)
-    return _triangle_planes(
-        np.concatenate(corners),
-        np.concatenate(emission),
-        np.concatenate(weights),
-        np.concatenate(double_sided),
-        share,
-    )
+    """Every visible emissive triangle that is large and bright enough. `share` is the chance that light
+    sampling turns to triangles at all; the densities contain it."""
+    objects = _emissive_objects(scene)
+    if not objects:
+        return TriangleLights(np.zeros((len(layout.LightPlane), 0), np.float32), {})
+    materials = [scene.materials[obj.material] for obj in objects]
+    corners = np.concatenate([_world_corners(obj) for obj in objects])
+    edge_1, edge_2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = np.linalg.norm(np.cross(edge_1, edge_2), axis=1) / 2
+    owner = np.repeat(np.arange(len(objects)), [len(obj.mesh.faces) for obj in objects])
+    weights = np.array([radiant_weight(material) for material in materials])
+    kept = (area >= SMALLEST_AREA) & (weights >= SMALLEST_WEIGHT)[owner]
+    owner, power = owner[kept], weights[owner[kept]] * area[kept]
+
+    planes = np.zeros((len(layout.LightPlane), len(owner)), np.float32)
+    if len(owner) == 0:
+        return TriangleLights(planes, {})
+    density = weights * (share / float(power.sum()))
+    plane = layout.LightPlane
+    planes[plane.VERTEX_X : plane.VERTEX_Z + 1] = corners[kept, 0].T
+    planes[plane.EDGE_1_X : plane.EDGE_1_Z + 1] = edge_1[kept].T
+    planes[plane.EDGE_2_X : plane.EDGE_2_Z + 1] = edge_2[kept].T
+    planes[plane.EMISSION_R : plane.EMISSION_B + 1] = np.array([m.emission for m in materials])[owner].T
+    planes[plane.PDF_AREA] = density[owner]
+    planes[plane.ALIAS_PROBABILITY], alias = alias_table(power)
+    planes[plane.ALIAS] = alias.view(np.float32)
+    double_sided = np.array([material.double_sided for material in materials], np.uint32)
+    planes[plane.DOUBLE_SIDED] = double_sided[owner].view(np.float32)
+    lit = np.flatnonzero(np.bincount(owner)).tolist()
+    return TriangleLights(planes, {objects[i].material: float(density[i]) for i in lit})
+
+
+def _world_corners(obj: Object) -> npt.NDArray[np.float64]:
+    """(F, 3, 3) of its triangles, in world space, counter-clockwise from outside."""
+    # A mirrored face keeps its outside: two corners change places to keep it on the normal's side.
+    mirrored = np.linalg.det(obj.world_from_object[:, :3]) < 0
+    faces = obj.mesh.faces[:, [0, 2, 1]] if mirrored else obj.mesh.faces
+    return affine.apply(obj.world_from_object, obj.mesh.vertices)[faces]
 
 
 def _emissive_objects(scene: Scene) -> list[Object]:
     """Those that are seen. They are few as a rule, and looking for them must be quick among thousands."""
     emissive = {name for name, material in scene.materials.items() if material.is_emissive}
     return [obj for obj in scene.objects if obj.material in emissive and obj.visible]
-
-
-def _triangle_planes(
-    corners: npt.NDArray[np.float64],
-    emission: npt.NDArray[np.float64],
-    weights: npt.NDArray[np.float64],
-    double_sided: npt.NDArray[np.bool_],
-    share: float,
-) -> TriangleLights:
-    edge_1, edge_2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    power = weights * np.linalg.norm(np.cross(edge_1, edge_2), axis=1) / 2
-    kept = power > 0
-    total = float(power[kept].sum())
-    planes = np.zeros((len(layout.LightPlane), int(kept.sum())), np.float32)
-    if total > 0:
-        plane = layout.LightPlane
-        planes[plane.VERTEX_X : plane.VERTEX_Z + 1] = corners[kept, 0].T
-        planes[plane.EDGE_1_X : plane.EDGE_1_Z + 1] = edge_1[kept].T
-        planes[plane.EDGE_2_X : plane.EDGE_2_Z + 1] = edge_2[kept].T
-        planes[plane.EMISSION_R : plane.EMISSION_B + 1] = emission[kept].T
-        planes[plane.PDF_AREA] = weights[kept] * (share / total)
-        planes[plane.ALIAS_PROBABILITY], alias = alias_table(power[kept])
-        planes[plane.ALIAS] = alias.view(np.float32)
-        planes[plane.DOUBLE_SIDED] = double_sided[kept].astype(np.uint32).view(np.float32)
-    return TriangleLights(planes, total)
 
 
 def alias_table(

@@ -11,7 +11,7 @@ import pyopencl as cl
 from incpt.core import layout
 from incpt.device.device import Device
 from incpt.scene.material import Material
-from incpt.tables import albedo, lights
+from incpt.tables import albedo
 
 _COPIED = ("base_color", "metallic", "emission", "roughness", "absorption", "specular", "ior", "transmission",
            "priority")  # fmt: skip
@@ -36,17 +36,17 @@ class MaterialTables:
 
 
 def material_tables(
-    device: Device, materials: Mapping[str, Material], density_scale: float
+    device: Device, materials: Mapping[str, Material], densities: Mapping[str, float]
 ) -> MaterialTables:
-    """Those of `materials`, numbered in order. `density_scale` is that of LightTables."""
+    """Those of `materials`, numbered in order. `densities` are those of LightTables."""
     # One row at least: rays that miss read material 0.
     rows = np.zeros(max(len(materials), 1), layout.MATERIAL)
     layers = np.zeros((len(rows), layout.ALBEDO_TABLE_SIZE + 1), np.float32)
     flags = layout.MaterialFlag
-    for row, layer, material in zip(rows, layers, materials.values(), strict=False):
-        for name in _COPIED:
-            row[name] = getattr(material, name)
-        row["light_pdf"] = lights.radiant_weight(material) * density_scale
+    for row, layer, (name, material) in zip(rows, layers, materials.items(), strict=False):
+        for field in _COPIED:
+            row[field] = getattr(material, field)
+        row["light_pdf"] = densities.get(name, 0.0)
         row["flags"] = (flags.DOUBLE_SIDED if material.double_sided else 0) | (
             flags.TRANSMISSIVE if material.transmission > 0 else 0
         )

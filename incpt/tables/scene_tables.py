@@ -163,7 +163,7 @@ def _make(pool: GeometryPool, scene: Scene, previous: SceneTables | None) -> Sce
     # Lights need the environment, and materials the densities of the lights.
     has_image_light = _has_image_light(scene, environment)
     lights = part("lights", lambda: light_tables(device, scene, has_image_light))
-    materials = part("materials", lambda: material_tables(device, scene.materials, lights.density_scale))
+    materials = part("materials", lambda: material_tables(device, scene.materials, lights.densities))
     return SceneTables(pool, scene, meshes, objects, top_level, environment, lights, materials)
 
 

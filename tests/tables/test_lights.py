@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -14,14 +17,19 @@ from support.kernels import (
     struct_rows,
     uniforms,
 )
+from support.small_scenes import mixed_scene
 
 from incpt.core import layout
+from incpt.device.device import Device
+from incpt.render.session import Session
 from incpt.scene.image import Image
 from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
 from incpt.tables import environment, lights
+from incpt.tables.geometry_pool import GeometryPool
+from incpt.tables.scene_tables import SceneTables, tables_of
 
 COUNT = 1 << 17
 Array = npt.NDArray[np.floating]
@@ -180,7 +188,68 @@ def test_scene_without_emitters_has_no_triangles() -> None:
     table = lights.triangle_lights(
         Scene(materials={"m": Material()}, objects=(Object("o", shape("cube"), "m"),)), 1
     )
-    assert table.count == 0 and table.total == 0
+    assert table.count == 0 and not table.densities
+
+
+def _speck(edge: float, emission: float, name: str = "speck") -> tuple[dict[str, Material], Object]:
+    mesh = _triangle((0, 0, 0), (edge, 0, 0), (0, 0, edge))
+    return {name: Material(emission=(emission,) * 3)}, Object(name, mesh, name, position=(0, 3, 0))
+
+
+@pytest.mark.parametrize("edge", [1e-3, 1e-6, 1e-8, 1e-10, 1e-15, 1e-19, 1e-22])
+@pytest.mark.parametrize("emission", [1e-310, 1e-40, 1e-30, 1.0, 1e9])
+def test_densities_stay_finite_however_small_and_faint_the_only_light_is(
+    device: Device, edge: float, emission: float
+) -> None:
+    materials, obj = _speck(edge, emission)
+    with np.errstate(all="raise", under="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("error")
+        tables = _tables(device, Scene(materials=materials, objects=(obj,)))
+    is_light = edge > 1e-9 and emission > 1e-38
+    assert tables.light_count == is_light and ("TRIANGLE_LIGHTS" in tables.features) == is_light
+    planes, rows = _planes(tables), _material_rows(tables)
+    assert np.isfinite(planes[layout.LightPlane.PDF_AREA]).all() and np.isfinite(rows["light_pdf"]).all()
+    # A point that is not sampled has no density either, so that a ray that meets it brings all its light.
+    np.testing.assert_allclose(rows["light_pdf"], 2 / edge**2 if is_light else 0, rtol=1e-6)
+
+
+def test_what_is_too_small_to_be_a_light_has_no_density_beside_lights(device: Device) -> None:
+    speck, small = _speck(1e-12, 1e9)
+    faint, large = _speck(0.5, 1e-37, "faint")
+    scene = Scene(materials={**speck, **faint}, objects=(small, large))
+    with np.errstate(all="raise", under="ignore"):
+        tables = _tables(device, scene)
+    assert tables.light_count == 1
+    assert _material_rows(tables)["light_pdf"].tolist() == [0, _planes(tables)[layout.LightPlane.PDF_AREA, 0]]
+
+
+@pytest.mark.parametrize("edge", [1e-10, 1e-20])
+def test_a_speck_changes_nothing_of_a_picture(device: Device, edge: float) -> None:
+    speck, small = _speck(edge, 1e3)
+    scene = mixed_scene()
+    plain, with_speck = (
+        Session(one, device=device)
+        for one in (scene, replace(scene, materials={**scene.materials, **speck}).with_added(small))
+    )
+    for session in (plain, with_speck):
+        assert session.step().nonfinite == 0
+    np.testing.assert_array_equal(with_speck.image(), plain.image())
+
+
+def _tables(device: Device, scene: Scene) -> SceneTables:
+    return tables_of(GeometryPool(device), scene)
+
+
+def _planes(tables: SceneTables) -> npt.NDArray[np.float32]:
+    """(len(LightPlane), N) as they are on the device."""
+    planes = np.zeros((len(layout.LightPlane), tables.light_count), np.float32)
+    return tables.pool.device.read(tables.buffer("lights"), planes) if planes.size else planes
+
+
+def _material_rows(tables: SceneTables) -> npt.NDArray[np.void]:
+    """layout.MATERIAL of each material, as they are on the device."""
+    rows = np.zeros(len(tables.scene.materials), layout.MATERIAL)
+    return tables.pool.device.read(tables.buffer("materials"), rows)
 
 
 # Environment images
