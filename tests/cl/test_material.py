@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cache
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-from support.kernels import SIGNIFICANCE, call, direction, direction_p_value, struct_rows, uniforms
+from support.kernels import SIGNIFICANCE, call, device, direction, direction_p_value, struct_rows, uniforms
+from support.parameters import NAMES, unlike_default
 
 from incpt.core import layout
 from incpt.scene.material import Material
 from incpt.tables import albedo
+from incpt.tables.materials import material_tables
 
 COUNT = 1 << 16
 Array = npt.NDArray[np.floating]
@@ -248,3 +250,17 @@ def test_variant_for_matte_scenes_is_the_same(name: str, angle_deg: float) -> No
         pairs = zip(sample(material, wo, 4096), sample(material, wo, 4096, features=("MATTE",)), strict=True)
         for general, variant in pairs:
             np.testing.assert_allclose(variant, general, rtol=1e-4, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_scenes_are_matte_where_the_variant_makes_no_difference(name: str) -> None:
+    """Whatever parameter a Lambertian surface gets: what is_matte leaves to the variant is shaded by it as
+    by the general kernels, and nothing is left to those in vain."""
+    material = replace(MATERIALS["lambert"], **{name: unlike_default(name)})
+    wi = direction(np.radians([[10.0], [40.0], [80.0]]), np.arange(0.0, 6.0)).reshape(3, -1)
+    general, variant = (
+        [np.vstack(evaluate(material, wo_at(angle), wi, features)) for angle in ANGLES_DEG]
+        for features in ((), ("MATTE",))
+    )
+    is_same = np.allclose(variant, general, rtol=1e-5, atol=1e-7)
+    assert material_tables(device(), {"one": material}, {}).is_matte == is_same

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import Any
 
 import pytest
+from support.parameters import NAMES
 
 from incpt.core.errors import InputError
 from incpt.core.layout import MATERIAL
 from incpt.scene.material import Material
 
-NAMES = tuple(field.name for field in fields(Material))
 DERIVED = {"double_sided": "flags"}
 """Parameters that kernels see in another form, and the field of the struct that holds it."""
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import pytest
 from support.small_scenes import mixed_scene
 from support.ui_harness import Desk, changes, desk, places, state
 
+from incpt.scene.material import Material
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
@@ -130,6 +131,14 @@ ELSEWHERE = {
     "Frame selected##camera", "Reset##camera", "Pin this picture",
 }  # fmt: skip
 """Tested below, one by one."""
+
+
+def test_every_parameter_of_a_material_has_a_row() -> None:
+    used = [field.place for field in FIELDS] + [place for _, _, place in CHECKBOXES]
+    material = {place.split(".")[3] for place in used if place.startswith("scene.materials.")}
+    # Emission has two widgets of its own, tested below.
+    assert material | {"emission"} == {field.name for field in fields(Material)}
+    assert "emission" not in material and {"Emission colour", "Emission strength"} <= ELSEWHERE
 
 
 @pytest.fixture

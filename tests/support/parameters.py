@@ -1,0 +1,29 @@
+"""Values of material parameters that differ from the defaults, so that a test cannot miss a new one."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+from incpt.core.errors import InputError
+from incpt.scene.material import Material
+
+NAMES = tuple(field.name for field in fields(Material))
+
+
+def unlike_default(name: str) -> Any:
+    """A valid value of a parameter, in every component unlike that of its default."""
+    default = getattr(Material(), name)
+    if isinstance(default, bool):
+        return not default
+    if isinstance(default, int):
+        return default + 7
+    if isinstance(default, tuple):
+        return tuple(0.125 + 0.25 * i for i in range(len(default)))
+    for value in (default + 0.25, default - 0.25):
+        try:
+            Material(**{name: value})
+        except InputError:
+            continue
+        return value
+    raise AssertionError(f"{name}: {default} has no valid neighbour; name one here")
