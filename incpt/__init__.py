@@ -9,56 +9,81 @@ while session.mode is incpt.Mode.INCREMENTAL:
     session.step()
 image = session.image()  # (H, W, 3) float32 linear radiance
 ```
+
+Names are loaded when they are first used: scenes need numpy, sessions pyopencl, and `incpt --help` neither.
 """
 
-from incpt.core.errors import DeviceError, InputError, InputWarning, OutputError
-from incpt.core.settings import RenderSettings
-from incpt.device.device import Device
-from incpt.formats.images import load_image, write_exr, write_png
-from incpt.formats.mesh_files import load_mesh
-from incpt.formats.registry import load
-from incpt.formats.scene_save import save
-from incpt.picture.tone_mapping import tone_map
-from incpt.render.first_hits import FirstHits
-from incpt.render.modes import Mode
-from incpt.render.session import Session, StepReport
-from incpt.scene.camera import Camera
-from incpt.scene.change import Change, diff
-from incpt.scene.environment import Environment
-from incpt.scene.image import Image
-from incpt.scene.material import Material
-from incpt.scene.mesh import Mesh
-from incpt.scene.model import Object, Scene
-from incpt.scene.shapes import shape
-from incpt.scene.transform import Transform
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-__all__ = [
-    "Camera",
-    "Change",
-    "Device",
-    "DeviceError",
-    "Environment",
-    "FirstHits",
-    "Image",
-    "InputError",
-    "InputWarning",
-    "Material",
-    "Mesh",
-    "Mode",
-    "Object",
-    "OutputError",
-    "RenderSettings",
-    "Scene",
-    "Session",
-    "StepReport",
-    "Transform",
-    "diff",
-    "load",
-    "load_image",
-    "load_mesh",
-    "save",
-    "shape",
-    "tone_map",
-    "write_exr",
-    "write_png",
-]
+if TYPE_CHECKING:
+    from incpt.core.errors import (
+        DeviceError as DeviceError,
+        InputError as InputError,
+        InputWarning as InputWarning,
+        OutputError as OutputError,
+    )
+    from incpt.core.settings import RenderSettings as RenderSettings
+    from incpt.device.device import Device as Device
+    from incpt.formats.images import load_image as load_image, write_exr as write_exr, write_png as write_png
+    from incpt.formats.mesh_files import load_mesh as load_mesh
+    from incpt.formats.registry import load as load
+    from incpt.formats.scene_save import save as save
+    from incpt.picture.tone_mapping import tone_map as tone_map
+    from incpt.render.first_hits import FirstHits as FirstHits
+    from incpt.render.modes import Mode as Mode
+    from incpt.render.session import Session as Session, StepReport as StepReport
+    from incpt.scene.camera import Camera as Camera
+    from incpt.scene.change import Change as Change, diff as diff
+    from incpt.scene.environment import Environment as Environment
+    from incpt.scene.image import Image as Image
+    from incpt.scene.material import Material as Material
+    from incpt.scene.mesh import Mesh as Mesh
+    from incpt.scene.model import Object as Object, Scene as Scene
+    from incpt.scene.shapes import shape as shape
+    from incpt.scene.transform import Transform as Transform
+
+_HOMES = {
+    "Camera": "scene.camera",
+    "Change": "scene.change",
+    "Device": "device.device",
+    "DeviceError": "core.errors",
+    "Environment": "scene.environment",
+    "FirstHits": "render.first_hits",
+    "Image": "scene.image",
+    "InputError": "core.errors",
+    "InputWarning": "core.errors",
+    "Material": "scene.material",
+    "Mesh": "scene.mesh",
+    "Mode": "render.modes",
+    "Object": "scene.model",
+    "OutputError": "core.errors",
+    "RenderSettings": "core.settings",
+    "Scene": "scene.model",
+    "Session": "render.session",
+    "StepReport": "render.session",
+    "Transform": "scene.transform",
+    "diff": "scene.change",
+    "load": "formats.registry",
+    "load_image": "formats.images",
+    "load_mesh": "formats.mesh_files",
+    "save": "formats.scene_save",
+    "shape": "scene.shapes",
+    "tone_map": "picture.tone_mapping",
+    "write_exr": "formats.images",
+    "write_png": "formats.images",
+}
+"""The module of each public name. What type checkers read stands above; a test compares both."""
+
+__all__ = list(_HOMES)
+
+if not TYPE_CHECKING:  # They would take any name for a public one.
+
+    def __getattr__(name: str) -> Any:
+        if name not in _HOMES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        value = globals()[name] = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+        return value
+
+    def __dir__() -> list[str]:
+        return sorted({*globals(), *_HOMES})

@@ -79,7 +79,7 @@ def test_kernels_and_scenes_are_found_as_resources() -> None:
 
 @pytest.mark.slow
 def test_importing_incpt_opens_no_window_library() -> None:
-    code = "import sys, incpt, incpt.cli.main; print(*sys.modules)"
+    code = "import sys, incpt.cli.main; from incpt import *; print(*sys.modules)"
     modules = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
     loaded = {name.split(".")[0] for name in modules.split()} | set(modules.split())
     assert "incpt.cli.main" in loaded
@@ -90,10 +90,24 @@ LATE = ("trimesh", "scipy", "OpenEXR", "PIL", "tomlkit", "rich", "typer")
 """Libraries that only some files and the command line need."""
 
 
-def test_importing_incpt_loads_no_library_of_files_or_terminals() -> None:
-    code = f"import sys, incpt; print(*sorted(set({LATE}) & set(sys.modules)))"
-    found = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
-    assert found.split() == []
+SCENES_ONLY = "import incpt; incpt.Scene(); incpt.load, incpt.save, incpt.RenderSettings()"
+HELP = "from incpt.cli.main import main; main(['--help']); main(['--version']); main(['render', '--help'])"
+
+
+@pytest.mark.parametrize(
+    ("code", "absent", "present"),
+    [
+        ("import incpt", {*LATE, "numpy", "pyopencl"}, {"incpt"}),
+        (HELP, {*LATE, "numpy", "pyopencl"} - {"typer"}, {"typer"}),
+        (SCENES_ONLY, {*LATE, "pyopencl"}, {"numpy"}),
+        ("from incpt import *", set(LATE), {"numpy", "pyopencl"}),
+    ],
+)
+def test_libraries_are_loaded_when_they_are_needed(code: str, absent: set[str], present: set[str]) -> None:
+    code += "\nimport sys; print('loaded:', *sys.modules)"
+    output = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    loaded = set(output.rpartition("loaded:")[2].split())
+    assert not loaded & absent and present <= loaded
 
 
 WITHOUT_LIBRARIES = f"""

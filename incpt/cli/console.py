@@ -9,12 +9,13 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
-
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-from rich.table import Table
+from typing import TYPE_CHECKING
 
 from incpt.core.errors import one_line
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+    from rich.table import Table
 
 
 class Stopped(Exception):  # noqa: N818 - what the user asked for is no error
@@ -85,6 +86,9 @@ class PathProgress:
 @contextmanager
 def path_progress(what: str, total: int, pixels: int) -> Iterator[PathProgress]:
     """A progress bar on stderr for `total` paths of an image of so many `pixels`."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
@@ -110,6 +114,8 @@ def complain(message: str, status: int) -> int:
 
 def print_table(table: Table) -> None:
     """Prints a table to stdout, at the width of the terminal where there is one."""
+    from rich.console import Console
+
     console = Console()
     # Without a terminal rich takes 80 columns, too few for a replay's table.
     (console if console.is_terminal else Console(width=120)).print(table)

@@ -4,16 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import pyopencl as cl
 import typer
-from rich.markup import escape
-from rich.table import Table
 
 from incpt.cli.console import print_table
 from incpt.cli.options import DeviceOption
-from incpt.device.device import all_devices, choose, device_name
-from incpt.render.session import Session
-from incpt.scene.model import Scene
 
 
 def devices(
@@ -21,6 +15,14 @@ def devices(
     test: Annotated[bool, typer.Option("--test", help="Build and run a kernel on the chosen one.")] = False,
 ) -> None:
     """List the OpenCL devices, and which one is taken."""
+    import pyopencl as cl
+    from rich.markup import escape
+    from rich.table import Table
+
+    from incpt.device.device import all_devices, choose, device_name
+    from incpt.render.session import Session
+    from incpt.scene.model import Scene
+
     taken = choose(device)
     table = Table(box=None, pad_edge=False)
     for heading, side in (("", "right"), ("device", "left"), ("kind", "left"), ("units", "right")):

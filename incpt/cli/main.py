@@ -11,7 +11,6 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
-from importlib.metadata import version
 from typing import Annotated, Any
 
 import typer
@@ -81,6 +80,8 @@ def _show_warning(message: Warning | str, category: type[Warning], *rest: Any, *
 
 def _print_version(wanted: bool) -> None:
     if wanted:
+        from importlib.metadata import version
+
         print(f"incpt {version('incpt')}")
         raise typer.Exit
 

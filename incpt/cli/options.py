@@ -5,14 +5,15 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from incpt.core.errors import InputError
 from incpt.core.settings import RenderSettings
-from incpt.render.tiles import TileGrid
-from incpt.scene.model import Scene
+
+if TYPE_CHECKING:
+    from incpt.scene.model import Scene
 
 SceneArgument = Annotated[Path, typer.Argument(help="Scene file (.toml).", show_default=False)]
 DeviceOption = Annotated[
@@ -41,6 +42,8 @@ def settings_from(scene: Scene, size: str | None, **given: Any) -> RenderSetting
 
 def padded_pixels(settings: RenderSettings) -> int:
     """Paths of one sample per pixel: cut tiles trace as many as whole ones."""
+    from incpt.render.tiles import TileGrid
+
     return TileGrid(*settings.size, settings.tile_size).count * settings.tile_size**2
 
 

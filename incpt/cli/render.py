@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,9 +21,9 @@ from incpt.cli.options import (
 )
 from incpt.core.errors import InputError, OutputError
 from incpt.core.settings import STRATEGIES
-from incpt.formats import registry
-from incpt.render.export import SUFFIXES, write_picture
-from incpt.render.session import Session, StepReport
+
+if TYPE_CHECKING:
+    from incpt.render.session import StepReport
 
 
 def render(
@@ -47,6 +47,10 @@ def render(
     device: DeviceOption = None,
 ) -> None:
     """Render a scene to a picture. Ctrl-C keeps what is done."""
+    from incpt.formats import registry
+    from incpt.render.export import write_picture
+    from incpt.render.session import Session
+
     _check_picture_path(output)
     if aovs and output.suffix.lower() != ".exr":
         raise InputError(f"--aovs: {output} cannot hold them; use an .exr")
@@ -82,6 +86,8 @@ def render(
 
 def _check_picture_path(path: Path) -> None:
     """Before the long work: a suffix that names a format, and a place that can be written."""
+    from incpt.render.export import SUFFIXES
+
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"-o {path}: ends in no known format; use .exr or .png")
     if path.is_dir():

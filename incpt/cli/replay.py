@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,12 +20,9 @@ from incpt.cli.options import (
 )
 from incpt.core.errors import InputWarning
 from incpt.core.settings import STRATEGIES
-from incpt.device.device import Device
-from incpt.formats import registry
-from incpt.formats.edit_script import load_edits
-from incpt.render.session import StepReport
-from incpt.replay.replay import Replay, variants
-from incpt.replay.report import ReplayReport
+
+if TYPE_CHECKING:
+    from incpt.render.session import StepReport
 
 
 def replay(
@@ -46,6 +43,12 @@ def replay(
     device: DeviceOption = None,
 ) -> None:
     """Edit a scene without a window, under several strategies, and measure the error after each edit."""
+    from incpt.device.device import Device
+    from incpt.formats import registry
+    from incpt.formats.edit_script import load_edits
+    from incpt.replay.replay import Replay, variants
+    from incpt.replay.report import ReplayReport
+
     scene = registry.load(scene_file)
     script = load_edits(edits_file, scene)
     settings = settings_from(scene, size=size, seed=seed, max_bounces=max_bounces)
