@@ -32,13 +32,13 @@ if TYPE_CHECKING:
     from incpt.picture.tone_mapping import tone_map as tone_map
     from incpt.render.first_hits import FirstHits as FirstHits
     from incpt.render.modes import Mode as Mode
-    from incpt.render.session import Session as Session, StepReport as StepReport
+    from incpt.render.session import Session as Session, Snapshot as Snapshot, StepReport as StepReport
     from incpt.scene.camera import Camera as Camera
     from incpt.scene.change import Change as Change, diff as diff
     from incpt.scene.environment import Environment as Environment
     from incpt.scene.image import Image as Image
     from incpt.scene.material import Material as Material
-    from incpt.scene.mesh import Mesh as Mesh
+    from incpt.scene.mesh import Mesh as Mesh, MeshSource as MeshSource
     from incpt.scene.model import Object as Object, Scene as Scene
     from incpt.scene.shapes import shape as shape
     from incpt.scene.transform import Transform as Transform
@@ -55,12 +55,14 @@ _HOMES = {
     "InputWarning": "core.errors",
     "Material": "scene.material",
     "Mesh": "scene.mesh",
+    "MeshSource": "scene.mesh",
     "Mode": "render.modes",
     "Object": "scene.model",
     "OutputError": "core.errors",
     "RenderSettings": "core.settings",
     "Scene": "scene.model",
     "Session": "render.session",
+    "Snapshot": "render.session",
     "StepReport": "render.session",
     "Transform": "scene.transform",
     "diff": "scene.change",

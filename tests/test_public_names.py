@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import re
+import typing
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -47,3 +51,31 @@ def test_documents_use_names_that_there_are(document: str) -> None:
     used = {name for block in blocks for name in re.findall(r"\bincpt\.(\w+)", block)}
     assert used <= set(incpt.__all__)
     assert bool(used) == (document in ("README.md", "incpt/__init__.py"))
+
+
+MADE_BY_INCPT = {"Change", "FirstHits", "Mode", "Snapshot", "StepReport"}
+"""Values that nobody else makes."""
+
+
+def _functions(value: Any) -> list[Any]:
+    """A function itself, or the public methods of a class."""
+    if not inspect.isclass(value):
+        return [inspect.unwrap(value)]
+    members = inspect.getmembers(value, lambda member: inspect.isfunction(member) or inspect.ismethod(member))
+    return [member for name, member in members if name == "__init__" or not name.startswith("_")]
+
+
+def _named(hint: Any) -> Iterator[type]:
+    """The classes of incpt in an annotation."""
+    if inspect.isclass(hint) and hint.__module__.startswith("incpt."):
+        yield hint
+    for part in typing.get_args(hint):
+        yield from _named(part)
+
+
+@pytest.mark.parametrize("name", sorted(set(incpt.__all__) - MADE_BY_INCPT))
+def test_what_a_public_call_takes_has_a_public_name(name: str) -> None:
+    for function in _functions(getattr(incpt, name)):
+        hints = typing.get_type_hints(function)
+        taken = {one.__name__ for key, hint in hints.items() if key != "return" for one in _named(hint)}
+        assert taken <= set(incpt.__all__), function
