@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from typing import Any
 
+from incpt.core.checks import described, one_of, require_bool, whole
 from incpt.core.errors import InputError
 
 STRATEGIES = ("restart", "spiral")
@@ -62,11 +62,10 @@ class RenderSettings:
             value = getattr(self, name)
             if name == "slots_per_step" and value is None:
                 continue
-            object.__setattr__(self, name, _whole(name, value, low, high))
-        if not isinstance(self.aovs, bool):
-            raise InputError(f"aovs: {self.aovs!r} is not true or false")
-        _one_of("strategy", self.strategy, STRATEGIES)
-        _one_of("point_of_change", self.point_of_change, POINTS_OF_CHANGE)
+            object.__setattr__(self, name, whole(name, value, low, high))
+        require_bool("aovs", self.aovs)
+        one_of("strategy", self.strategy, STRATEGIES)
+        one_of("point_of_change", self.point_of_change, POINTS_OF_CHANGE)
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
@@ -87,28 +86,16 @@ _RANGES: dict[str, tuple[int, int]] = {
 }
 
 
-def _whole(name: str, value: Any, low: int, high: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) and not _is_integral(value):
-        raise InputError(f"{name}: {value!r} is not a whole number; use one from {low} to {high}")
-    if not low <= value <= high:
-        raise InputError(f"{name}: {value} is out of range; use a whole number from {low} to {high}")
-    return int(value)
-
-
-def _is_integral(value: Any) -> bool:
-    return hasattr(value, "__index__")
-
-
 def _whole_pair(value: Any) -> tuple[int, int]:
-    if not isinstance(value, Iterable) or isinstance(value, str) or len(pair := list(value)) != 2:
-        raise InputError(f"size: {value!r} is not a pair of width and height, such as [960, 540]")
+    try:
+        width, height = value
+        is_pair = not isinstance(value, str)
+    except (TypeError, ValueError):
+        is_pair = False
+    if not is_pair:
+        raise InputError(f"size: {described(value)} is not a pair of width and height, such as [960, 540]")
     limit = math.isqrt(MAX_IMAGE_PIXELS) * 4
-    return _whole("size (width)", pair[0], 1, limit), _whole("size (height)", pair[1], 1, limit)
-
-
-def _one_of(name: str, value: Any, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise InputError(f"{name}: {value!r} is not known; choose one of {', '.join(choices)}")
+    return whole("size (width)", width, 1, limit), whole("size (height)", height, 1, limit)
 
 
 PICTURE_SETTINGS = ("max_bounces", "transmission_bounces", "roulette_depth", "seed")

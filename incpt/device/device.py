@@ -16,6 +16,7 @@ import numpy.typing as npt
 import pyopencl as cl
 
 from incpt.core import arena, layout
+from incpt.core.checks import one_of, require, whole
 from incpt.core.errors import DeviceError, InputError
 from incpt.device import pocl, program
 
@@ -24,6 +25,9 @@ DEVICE_VARIABLE = "INCPT_DEVICE"
 _SCALARS = (np.generic, np.ndarray)
 """Arguments of kernels that are passed by value: numbers, and structs as arrays without a dimension."""
 
+
+_MOST_DEVICES = 1000
+"""Indices up to this one are looked for."""
 
 BUILD_SIZES = (1, 1 << 17)
 """Work-items of the launches after which a kernel is built to the end: PoCL translates one to machine code
@@ -52,7 +56,12 @@ class Device:
     """
 
     def __init__(self, choice: str | int | None = None, features: tuple[str, ...] = ()) -> None:
-        self.features = features
+        if not isinstance(choice, str | None):
+            choice = whole("device (index, or a part of its name)", choice, 0, _MOST_DEVICES)
+        require("features", features, (tuple, list), "a list of names")
+        for feature in features:
+            one_of("features", feature, program.FEATURES)
+        self.features = tuple(features)
         self.cl_device = choose(choice)
         pocl.require_linker(self.cl_device)
         self.target = pocl.name_target(self.cl_device)

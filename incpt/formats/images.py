@@ -19,6 +19,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from incpt.core.arrays import numbers
+from incpt.core.checks import path_of, require
 from incpt.core.errors import InputError, one_line
 from incpt.core.files import check_readable, write_atomically, write_bytes
 from incpt.core.layout import ENVIRONMENT_MAX_SIZE
@@ -42,6 +44,7 @@ def write_png(
 
     Raises OutputError where the file cannot be written, InputError for an array that is no picture.
     """
+    path = path_of("path", path)
     pixels = tone_map(image, exposure, curve)
     if pixels.ndim != 3 or pixels.size == 0:
         raise InputError(f"image: has shape {pixels.shape}; a picture has shape (height, width, 3)")
@@ -49,10 +52,10 @@ def write_png(
 
     encoded = io.BytesIO()
     PIL.Image.fromarray(pixels).save(encoded, "PNG")
-    write_bytes(Path(path), encoded.getvalue())
+    write_bytes(path, encoded.getvalue())
 
 
-def write_exr(path: str | os.PathLike[str], layers: Mapping[str, npt.NDArray[Any]]) -> None:
+def write_exr(path: str | os.PathLike[str], layers: Mapping[str, npt.ArrayLike]) -> None:
     """Writes layers of one picture, atomically.
 
     A (H, W) array is one channel under its name ("depth.Z", "object_id"). A (H, W, n) array is n
@@ -60,9 +63,13 @@ def write_exr(path: str | os.PathLike[str], layers: Mapping[str, npt.NDArray[Any
     normal.Y, normal.Z. uint32 is kept, everything else becomes float32. Raises OutputError where the
     file cannot be written, InputError for layers that do not fit together.
     """
+    path = path_of("path", path)
+    require("layers", layers, Mapping, 'a mapping of names to arrays, such as {"RGB": image}')
     channels: dict[str, npt.NDArray[Any]] = {}
     for name, values in layers.items():
-        channels.update(_channels(name, np.asarray(values)))
+        require("layers", name, str, "the name of a layer")
+        kind = np.uint32 if getattr(values, "dtype", None) == np.uint32 else np.float32
+        channels.update(_channels(name, numbers(f"layer {name!r}", values, kind)))
     shapes = {channel.shape for channel in channels.values()}
     if len(shapes) != 1 or 0 in next(iter(shapes)):
         raise InputError(f"layers: have sizes {sorted(shapes)}; a picture needs layers of one size")
@@ -75,14 +82,12 @@ def write_exr(path: str | os.PathLike[str], layers: Mapping[str, npt.NDArray[Any
             with _quiet():
                 OpenEXR.File(header, channels).write(str(temporary))
         except RuntimeError as error:
-            raise OSError(one_line(error).replace(str(temporary), Path(path).name)) from None
+            raise OSError(one_line(error).replace(str(temporary), path.name)) from None
 
-    write_atomically(Path(path), write)
+    write_atomically(path, write)
 
 
 def _channels(name: str, values: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
-    kind = np.uint32 if values.dtype == np.uint32 else np.float32
-    values = values.astype(kind, copy=False)
     prefix, dot, letters = name.rpartition(".")
     if values.ndim == 2 and name:
         return {name: np.ascontiguousarray(values)}
@@ -100,7 +105,7 @@ def load_image(path: str | os.PathLike[str]) -> Image:
     that is missing, damaged, too large or no OpenEXR, other channels, radiance that is negative or not
     finite.
     """
-    path = Path(path)
+    path = path_of("path", path)
     status = check_readable(path)
     key = (os.path.realpath(path), status.st_mtime_ns, status.st_size)
     image = _images.get(key)

@@ -7,7 +7,9 @@ import os
 import weakref
 from difflib import get_close_matches
 from pathlib import Path
+from types import NoneType
 
+from incpt.core.checks import path_of, require
 from incpt.core.errors import InputError
 from incpt.core.files import check_readable
 from incpt.formats import registry
@@ -31,7 +33,7 @@ def load_parts(path: str | os.PathLike[str]) -> tuple[MeshPart, ...]:
     out of range, a vertex that is not finite, zero area, or that come twice are left out, with an
     InputWarning. Raises InputError: the file is missing, damaged, of an unknown type, or has no face left.
     """
-    path = Path(path)
+    path = path_of("path", path)
     status = check_readable(path)
     row = registry.format_of(path, FileKind.MESH)
     if row is None:
@@ -50,7 +52,9 @@ def load_parts(path: str | os.PathLike[str]) -> tuple[MeshPart, ...]:
 def load_mesh(path: str | os.PathLike[str], part: str | None = None) -> Mesh:
     """The mesh of a file, or its part of that name. Raises InputError, also where the file holds several
     meshes and `part` is not given."""
-    return choose_part(Path(path), load_parts(path), part).mesh
+    path = path_of("path", path)
+    require("part", part, (str, NoneType), "the name of a part")
+    return choose_part(path, load_parts(path), part).mesh
 
 
 def choose_part(path: Path, parts: tuple[MeshPart, ...], name: str | None) -> MeshPart:

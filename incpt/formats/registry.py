@@ -16,6 +16,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from incpt.core.checks import path_of
 from incpt.core.errors import InputError, InputWarning, in_place
 from incpt.core.files import check_readable
 from incpt.scene.model import Scene
@@ -99,7 +100,7 @@ def load(path: str | os.PathLike[str]) -> Scene:
     An InputWarning tells of faces that were left out and of a scene that shows nothing. Raises InputError,
     one line that names file, table and key.
     """
-    path = Path(path)
+    path = path_of("path", path)
     check_readable(path)
     row = format_of(path, FileKind.SCENE, FileKind.MESH)
     if row is None:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from incpt.core import files
+from incpt.core.checks import path_of, require
 from incpt.core.errors import InputError, InputWarning, one_line
 from incpt.formats import images, mesh_files, mesh_store
 from incpt.formats.scene_toml import CAMERA_KEYS, VERSION
@@ -30,7 +31,8 @@ def save(scene: Scene, path: str | os.PathLike[str]) -> None:
     OutputError where a file cannot be written (then nothing is left behind), InputError for a scene
     that no file can hold.
     """
-    path = Path(path)
+    require("scene", scene, Scene, "a Scene")
+    path = path_of("path", path)
     if path.suffix.lower() != ".toml":
         raise InputError(f"{path}: a scene is saved as TOML; end its name with .toml")
     beside = _Beside(path)

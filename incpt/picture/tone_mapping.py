@@ -11,9 +11,13 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from incpt.core.arrays import REAL, numbers
+from incpt.core.checks import described, one_of, require
 from incpt.core.errors import InputError
 
 CURVES = ("agx", "filmic", "srgb")
+LARGEST_EXPOSURE = 1000
+"""Stops, up or down: a factor that double precision still holds."""
 AGX_INSET = np.array(
     [
         [0.842479062253094, 0.0784335999999992, 0.0792237451477643],
@@ -49,9 +53,12 @@ def tone_map(linear: npt.ArrayLike, exposure: float = 0.0, curve: str = "agx") -
     Infinite radiance becomes white; undefined pixels (NaN) become magenta, so that they are seen.
     Raises InputError.
     """
-    if curve not in CURVES:
-        raise InputError(f"curve: {curve!r} is not known; choose one of {', '.join(CURVES)}")
-    radiance = np.asarray(linear, np.float64)
+    one_of("curve", curve, CURVES)
+    require("exposure", exposure, REAL, "a number of stops")
+    if not abs(exposure) <= LARGEST_EXPOSURE:
+        span = f"{-LARGEST_EXPOSURE} to {LARGEST_EXPOSURE}"
+        raise InputError(f"exposure: {described(exposure)} is out of range; use {span}")
+    radiance = numbers("image", linear, np.float64)
     if radiance.shape[-1:] != (3,):
         raise InputError(f"image: has shape {radiance.shape}; a picture has shape (height, width, 3)")
     undefined = np.isnan(radiance).any(axis=-1)

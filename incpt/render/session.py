@@ -10,10 +10,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from types import NoneType
 
 import numpy as np
 import numpy.typing as npt
 
+from incpt.core.checks import pair, require, require_bool, require_call, whole
 from incpt.core.errors import InputError
 from incpt.core.settings import RenderSettings
 from incpt.device.device import Device
@@ -31,6 +33,8 @@ from incpt.scene.change import Change, diff
 from incpt.scene.model import Scene
 from incpt.tables.geometry_pool import GeometryPool
 from incpt.tables.scene_tables import SceneTables, tables_of
+
+_PIXEL = "a pixel (x, y)"
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,8 @@ class Session:
         settings: RenderSettings | None = None,
         device: Device | str | int | None = None,
     ) -> None:
+        require("scene", scene, Scene, "a Scene; load() reads one")
+        require("settings", settings, (RenderSettings, NoneType), "RenderSettings")
         settings = scene.settings if settings is None else settings
         settings = settings if size is None else replace(settings, size=size)
         self.device = device if isinstance(device, Device) else Device(device)
@@ -138,6 +144,8 @@ class Session:
     def step(self, slots: int | None = None) -> StepReport:
         """Render one step, at most to the end of the queue: `slots` of tile_size^2 paths each (fewer where
         memory does not suffice), or as many as the settings say."""
+        if slots is not None:
+            slots = whole("slots", slots, 1)
         start = time.perf_counter()
         before, film, path_buffer = self.progress, self._state.film, self._state.path_buffer
         settings = before.settings
@@ -173,6 +181,9 @@ class Session:
         `since` is the scene before a drag of which this edit is one step: the point of change then takes
         in where the object was before the drag. `end_drag` ends it.
         """
+        require("scene", scene, Scene, "a Scene")
+        require("since", since, (Scene, NoneType), "a Scene")
+        pixel = _point(pixel)
         state = self._state if settings is None else self._configured(settings)
         change = diff(self.scene, scene)
         progress = state.progress.after_edit(self.scene, scene, change, state.film, since, pixel)
@@ -183,7 +194,8 @@ class Session:
         """End a drag that began with the scene `since`: what it changed is rendered anew, in the order and as
         often as the strategy and the settings say by now. Nothing happens where the picture started over.
         `pixel` is that of `edit`."""
-        progress = self.progress.after_drag(since, self.scene, self._state.film, pixel)
+        require("since", since, Scene, "a Scene")
+        progress = self.progress.after_drag(since, self.scene, self._state.film, _point(pixel))
         self._state = replace(self._state, progress=progress)
 
     def restart(self) -> None:
@@ -198,6 +210,8 @@ class Session:
 
     def render(self, spp: int, on_step: Callable[[StepReport], None] | None = None) -> None:
         """Step until every pixel shows the scene as it is now with at least `spp` samples."""
+        spp = whole("spp", spp, 0)
+        require_call("on_step", on_step)
         while self.mode is not Mode.REFINE or self.tile_spp.min() < spp:
             report = self.step()
             if on_step is not None:
@@ -210,6 +224,7 @@ class Session:
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from where a session stood. A tile that was under way then starts again. On an error
         everything stays as it was."""
+        require("snapshot", snapshot, Snapshot, "a Snapshot; Session.snapshot makes one")
         settings, cursor = snapshot.progress.settings, Cursor(snapshot.progress.cursor.tiles)
         film = _new_film(self.device, settings)
         film.restore(snapshot.sums)
@@ -220,6 +235,7 @@ class Session:
     def image(self, alpha: bool = False) -> npt.NDArray[np.float32]:
         """(H, W, 3) mean radiance, linear; row 0 is on top. What is not rendered anew yet shows the old
         picture, at first black. With `alpha` (H, W, 4): 0 where there was never a picture of this size."""
+        require_bool("alpha", alpha)
         image = strategy_of(self.settings).image(self._state.film)
         return image if alpha else np.ascontiguousarray(image[..., :3])
 
@@ -228,6 +244,7 @@ class Session:
         "albedo" and "normal" (H, W, 3) are the mean base colour and the mean shading normal (world space) of
         what the samples of the picture met first, 0 for those that met nothing. Distance and object have no
         mean: see `first_hits`. Raises InputError for a pass that there is not."""
+        require("name", name, str, "the name of a pass")
         passes = {one.name: one for one in self._state.film.passes}
         if name not in passes:
             hint = "" if self.settings.aovs else "; the setting aovs adds albedo and normal"
@@ -248,30 +265,32 @@ class Session:
         setting `aovs` has nothing to do with them: it asks for means over the samples of the picture, see
         `pass_image`. Raises InputError for a size that no picture has and for rows that are not in it."""
         size = self.size if size is None else replace(self.settings, size=size).size
-        if rows is not None and not 0 <= rows[0] < rows[1] <= size[1]:
-            raise InputError(f"rows: {rows[0]} to {rows[1]} are no rows of {size[1]}; name one at least")
+        if rows is not None:
+            rows = _rows(rows, size[1])
         return first_hits.first_hits(self._tracer, self._tables, self.settings, size, rows)
 
     def pick(self, pixel: tuple[int, int]) -> str | None:
         """The name of the object under a pixel (x, y) from the top left, or None. Raises InputError outside
         the image."""
         width, height = self.size
-        if not (0 <= pixel[0] < width and 0 <= pixel[1] < height):
-            raise InputError(f"pixel ({pixel[0]}, {pixel[1]}): is outside the image of {width} x {height}")
-        x, y = int(pixel[0]), int(pixel[1])
-        return self.pick_point(((x + 0.5) / width, (y + 0.5) / height))
+        x, y = pair("pixel", pixel, _PIXEL)
+        if not (0 <= x < width and 0 <= y < height):
+            raise InputError(f"pixel ({x:g}, {y:g}): is outside the image of {width} x {height}")
+        return self.pick_point(((int(x) + 0.5) / width, (int(y) + 0.5) / height))
 
     def pick_point(self, point: tuple[float, float]) -> str | None:
         """The name of the object at a point (x, y) from the top left, in units of the image, or None: where
         there is none, and outside the image."""
-        if not (0 <= point[0] <= 1 and 0 <= point[1] <= 1):
+        x, y = pair("point", point, "a place (x, y) in the image")
+        if not (0 <= x <= 1 and 0 <= y <= 1):
             return None
-        return first_hits.object_at(self._tracer, self._tables, self.settings, point)
+        return first_hits.object_at(self._tracer, self._tables, self.settings, (x, y))
 
     def build(self, on_progress: Callable[[int, int], None] | None = None) -> None:
         """Build every kernel that the scene as it is now needs, so that no later call has to wait for one.
         `on_progress` is called with how many of how many steps are done; not at all if nothing is to do.
         What it raises ends the building, which may go on later."""
+        require_call("on_progress", on_progress)
         aovs = self.settings.aovs
         kernels = (*self._tables.variant, *map(str, passes_of(self.settings)))
         if kernels in self.device.built:
@@ -299,6 +318,7 @@ class Session:
 
     def _configured(self, settings: RenderSettings) -> SessionState:
         """The state under other settings."""
+        require("settings", settings, RenderSettings, "RenderSettings")
         state, old = self._state, self.settings
         # Memory that a step took beyond the settings goes back with settings that need less.
         keeps_memory = slots_of(settings) * settings.tile_size**2 >= slots_of(old) * old.tile_size**2
@@ -316,6 +336,17 @@ class Session:
         params = launch_params(self._tables, self.settings)
         params["buffer_stride"] = path_buffer.stride
         return params
+
+
+def _point(pixel: tuple[float, float] | None) -> tuple[float, float] | None:
+    return None if pixel is None else pair("pixel", pixel, _PIXEL)
+
+
+def _rows(rows: tuple[int, int], height: int) -> tuple[int, int]:
+    top, bottom = pair("rows", rows, "a pair of rows, such as (0, 100)")
+    if not 0 <= top < bottom <= height or top % 1 or bottom % 1:
+        raise InputError(f"rows: {top:g} to {bottom:g} are no rows of {height}; name one at least")
+    return int(top), int(bottom)
 
 
 def _new_film(device: Device, settings: RenderSettings) -> Film:

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core.affine import Vector
+from incpt.core.arrays import numbers
 from incpt.core.errors import InputError
-from incpt.scene.checks import set_number, set_vector
+from incpt.scene.checks import LARGEST, checked_number, set_number, set_vector
 
 Array = npt.NDArray[np.float64]
 
@@ -36,6 +37,7 @@ class Camera:
     def image_plane(self, aspect: float) -> tuple[Array, Array, Array]:
         """(right, up, forward), each (3,), world space: the image plane lies one forward from the position,
         and reaches one right and one up from its middle. `aspect` is the picture's width by its height."""
+        aspect = checked_number("aspect", aspect, 1 / LARGEST, LARGEST)
         forward = _unit(np.subtract(self.target, self.position))
         right = np.cross(forward, _unit(np.asarray(self.up, np.float64)))
         if np.linalg.norm(right) < 1e-9:  # The view is along `up`, and any other axis gives a frame.
@@ -51,7 +53,10 @@ class Camera:
         behind the camera mean nothing.
         """
         right, up, forward = self.image_plane(aspect)
-        offset = np.asarray(points, np.float64) - np.asarray(self.position, np.float64)
+        points = numbers("points", points, np.float64)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise InputError(f"points: have shape {points.shape}; use (N, 3)")
+        offset = points - np.asarray(self.position, np.float64)
         depth = offset @ forward
         in_front = depth > 1e-6
         depth = np.where(in_front, depth, 1.0)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import compress, count
 from operator import is_not
 
+from incpt.core.checks import require
 from incpt.scene.mesh import is_deformation
 from incpt.scene.model import Object, Scene
 
@@ -56,7 +57,10 @@ class Change:
 
 
 def diff(old: Scene, new: Scene) -> Change:
-    """What changed from `old` to `new`. Unused materials count too: an object may use them next."""
+    """What changed from `old` to `new`. Unused materials count too: an object may use them next. Raises
+    InputError."""
+    require("old", old, Scene, "a Scene")
+    require("new", new, Scene, "a Scene")
     before, after = (
         {o.name: o for o in objects} for objects in _without_equal_ends(old.objects, new.objects)
     )

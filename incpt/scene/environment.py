@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import NoneType
 
 from incpt.core.affine import Vector
+from incpt.core.checks import require
 from incpt.scene.checks import LARGEST, set_number, set_vector
 from incpt.scene.image import Image
 
@@ -23,6 +25,7 @@ class Environment:
 
     def __post_init__(self) -> None:
         set_vector(self, "color", low=0.0)
+        require("image", self.image, (Image, NoneType), "an Image; load_image() reads one")
         set_number(self, "rotation_y", -LARGEST, LARGEST)
         set_number(self, "intensity", 0.0, LARGEST)
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import NoneType
 
 import numpy as np
 import numpy.typing as npt
 
+from incpt.core.arrays import frozen, numbers
+from incpt.core.checks import require
 from incpt.core.errors import InputError
 from incpt.core.layout import ENVIRONMENT_MAX_SIZE
-from incpt.scene.checks import frozen
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +25,8 @@ class Image:
     source: str | None = None
 
     def __post_init__(self) -> None:
-        pixels = frozen(self.pixels, np.float32)
+        pixels = frozen(numbers("pixels", self.pixels, np.float32))
+        require("source", self.source, (str, NoneType), "the path of a file, as a text")
         if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.size == 0:
             raise InputError(f"image: has shape {pixels.shape}; an environment has shape (height, width, 3)")
         if max(pixels.shape[:2]) > ENVIRONMENT_MAX_SIZE:

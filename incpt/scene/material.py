@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from incpt.core.affine import Vector
-from incpt.core.errors import InputError
+from incpt.core.checks import require_bool, whole
 from incpt.scene.checks import set_number, set_vector
 
 
@@ -36,12 +36,8 @@ class Material:
         set_number(self, "ior", 1.0, 100.0)
         set_vector(self, "absorption", low=0.0)
         set_vector(self, "emission", low=0.0)
-        if isinstance(self.priority, bool) or not isinstance(self.priority, int):
-            raise InputError(f"priority: {self.priority!r} is not a whole number; use one from 0 to 1000")
-        if not 0 <= self.priority <= 1000:
-            raise InputError(f"priority: {self.priority} is out of range; use a whole number from 0 to 1000")
-        if not isinstance(self.double_sided, bool):
-            raise InputError(f"double_sided: {self.double_sided!r} is not true or false")
+        object.__setattr__(self, "priority", whole("priority", self.priority, 0, 1000))
+        require_bool("double_sided", self.double_sided)
 
     @property
     def is_emissive(self) -> bool:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from types import NoneType
 
 import numpy as np
 import numpy.typing as npt
 
+from incpt.core.arrays import frozen, numbers
+from incpt.core.checks import require
 from incpt.core.errors import InputError
-from incpt.scene.checks import LARGEST, frozen
+from incpt.scene.checks import LARGEST
 
 
 @dataclass(frozen=True)
@@ -20,6 +23,10 @@ class MeshSource:
     shape: str | None = None
     file: str | None = None
     part: str | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("shape", "file", "part"):
+            require(name, getattr(self, name), (str, NoneType), "a text")
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +43,9 @@ class Mesh:
     source: MeshSource = MeshSource()
 
     def __post_init__(self) -> None:
-        vertices = frozen(self.vertices, np.float32)
-        faces = frozen(self.faces, np.int32)
+        vertices = frozen(numbers("vertices", self.vertices, np.float32))
+        faces = frozen(numbers("faces", self.faces, np.int32))
+        require("source", self.source, MeshSource, "a MeshSource")
         if vertices.ndim != 2 or vertices.shape[1] != 3:
             raise InputError(f"vertices: have shape {vertices.shape}; a mesh has shape (V, 3)")
         if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
@@ -49,7 +57,7 @@ class Mesh:
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", faces)
         if self.normals is not None:
-            normals = frozen(self.normals, np.float32)
+            normals = frozen(numbers("normals", self.normals, np.float32))
             if normals.shape != (len(faces), 3, 3) or not np.isfinite(normals).all():
                 raise InputError(f"normals: need shape ({len(faces)}, 3, 3) and finite numbers")
             object.__setattr__(self, "normals", normals)

@@ -6,9 +6,10 @@ makes `diff` cheap, undo is a list of scenes, and nobody has to set a flag that 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from operator import attrgetter
 from types import MappingProxyType
 from typing import Any
 
@@ -17,6 +18,7 @@ import numpy.typing as npt
 
 from incpt.core import affine
 from incpt.core.affine import Vector
+from incpt.core.checks import described, require, require_bool
 from incpt.core.errors import InputError
 from incpt.core.layout import MEDIUM_NONE
 from incpt.core.settings import RenderSettings
@@ -28,6 +30,7 @@ from incpt.scene.transform import IDENTITY, Transform
 
 _PLACEMENT = ("position", "rotation", "scale", "matrix")
 """Keywords of an object that stand for parts of its transform."""
+_NAME, _MATERIAL = attrgetter("name"), attrgetter("material")
 
 
 @dataclass(frozen=True)
@@ -59,15 +62,11 @@ class Object:
         transform: Transform = IDENTITY,
     ) -> None:
         if not isinstance(name, str) or not name:
-            raise InputError(f"name: {name!r} is not a name; give the object a text")
-        if not isinstance(mesh, Mesh):
-            raise InputError(f"mesh: {mesh!r} is not a Mesh; use shape() or load_mesh()")
-        if not isinstance(material, str):
-            raise InputError(f"material: {material!r} is not the name of a material")
-        if not isinstance(visible, bool):
-            raise InputError(f"visible: {visible!r} is not true or false")
-        if not isinstance(transform, Transform):
-            raise InputError(f"transform: {transform!r} is not a Transform")
+            raise InputError(f"name: {described(name)} is not a name; give the object a text")
+        require("mesh", mesh, Mesh, "a Mesh; use shape() or load_mesh()")
+        require("material", material, str, "the name of a material")
+        require_bool("visible", visible)
+        require("transform", transform, Transform, "a Transform")
         placed = transform.with_parts(position, rotation, scale, matrix)
         values = {
             "name": name, "mesh": mesh, "material": material, "transform": placed, "visible": visible,
@@ -104,7 +103,8 @@ class Object:
 
 @dataclass(frozen=True)
 class Scene:
-    """Everything that is seen. `settings` is the scene's own proposal of how to render it."""
+    """Everything that is seen: materials by name, and objects whose names differ. `settings` is the scene's
+    own proposal of how to render it. Raises InputError."""
 
     camera: Camera = field(default_factory=Camera)
     environment: Environment = field(default_factory=Environment)
@@ -113,12 +113,33 @@ class Scene:
     settings: RenderSettings = RenderSettings()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "materials", MappingProxyType(dict(self.materials)))
-        object.__setattr__(self, "objects", tuple(self.objects))
-        if len(self.materials) >= MEDIUM_NONE:
-            raise InputError(f"materials: {len(self.materials)} are more than {MEDIUM_NONE - 1}; merge some")
+        require("camera", self.camera, Camera, "a Camera")
+        require("environment", self.environment, Environment, "an Environment")
+        require("materials", self.materials, Mapping, "a mapping of names to Materials")
+        require("settings", self.settings, RenderSettings, "RenderSettings")
+        try:
+            materials, objects = dict(self.materials), tuple(self.objects)
+        except TypeError:
+            raise InputError(f"objects: {described(self.objects)} is not a list of Objects") from None
+        object.__setattr__(self, "materials", MappingProxyType(materials))
+        object.__setattr__(self, "objects", objects)
+        _require_all("materials", materials, str, "a name; name each by a text")
+        _require_all("materials", materials.values(), Material, "a Material")
+        if len(materials) >= MEDIUM_NONE:
+            raise InputError(f"materials: {len(materials)} are more than {MEDIUM_NONE - 1}; merge some")
+        # Asked of all objects at once, because every edit makes a scene, and there may be thousands.
+        try:
+            names, used = set(map(_NAME, objects)), set(map(_MATERIAL, objects))
+        except (AttributeError, TypeError):  # other things than objects
+            names, used = set(), set()
+        if len(names) < len(objects) or not used <= materials.keys():
+            self._complain_of_objects()
+
+    def _complain_of_objects(self) -> None:
+        """Raises InputError for the first object that cannot be in the scene."""
         seen: set[str] = set()
         for obj in self.objects:
+            require("objects", obj, Object, "an Object")
             if obj.name in seen:
                 raise InputError(f"objects: two are named {obj.name!r}; rename one of them")
             seen.add(obj.name)
@@ -135,14 +156,14 @@ class Scene:
 
     def object(self, name: str) -> Object:
         """The object of that name. Raises InputError."""
-        if name not in self.object_index:
-            raise InputError(f"object {name!r} is not in the scene; {_known(self.object_index)}")
+        if not isinstance(name, str) or name not in self.object_index:
+            raise InputError(f"object {described(name)} is not in the scene; {_known(self.object_index)}")
         return self.objects[self.object_index[name]]
 
     def material(self, name: str) -> Material:
         """The material of that name. Raises InputError."""
-        if name not in self.materials:
-            raise InputError(f"material {name!r} is not in the scene; {_known(self.materials)}")
+        if not isinstance(name, str) or name not in self.materials:
+            raise InputError(f"material {described(name)} is not in the scene; {_known(self.materials)}")
         return self.materials[name]
 
     def with_camera(self, **changes: Any) -> Scene:
@@ -155,6 +176,7 @@ class Scene:
 
     def with_material(self, name: str, /, **changes: Any) -> Scene:
         """A scene with a changed material, or with a new one of that name."""
+        require("name", name, str, "the name of a material")
         material = _replace(self.materials.get(name, Material()), changes)
         return replace(self, materials={**self.materials, name: material})
 
@@ -182,6 +204,13 @@ class Scene:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state, materials=MappingProxyType(state["materials"]))
+
+
+def _require_all(name: str, values: Collection[object], kind: type, wanted: str) -> None:
+    """Raises InputError for the first value that is of no such type."""
+    if not set(map(type, values)) <= {kind}:  # else all are of the very type, which is told quickly
+        for value in values:
+            require(name, value, kind, wanted)
 
 
 def _known(names: Iterable[str]) -> str:

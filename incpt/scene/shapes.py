@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from incpt.core.checks import described
 from incpt.core.errors import InputError
 from incpt.scene.mesh import Mesh, MeshSource
 
@@ -87,12 +88,17 @@ SHAPES = tuple(_GENERATORS)
 """Names of the built-in shapes."""
 
 
-@cache
 def shape(name: str) -> Mesh:
     """A built-in mesh: cube ([-0.5, 0.5]^3), sphere (radius 0.5), plane (1 x 1, facing +y), cylinder
-    (radius 0.5, height 1, along y). Sphere and cylinder carry shading normals. Raises InputError."""
-    if name not in SHAPES:
-        raise InputError(f"shape {name!r} is not known; choose one of {', '.join(SHAPES)}")
+    (radius 0.5, height 1, along y). Sphere and cylinder carry shading normals. It is the same mesh at every
+    call. Raises InputError."""
+    if not isinstance(name, str) or name not in SHAPES:
+        raise InputError(f"shape {described(name)} is not known; choose one of {', '.join(SHAPES)}")
+    return _made(name)
+
+
+@cache
+def _made(name: str) -> Mesh:
     vertices, faces, normals = _GENERATORS[name]()
     corner_normals = None if normals is None else normals.astype(np.float32)
     return Mesh(vertices.astype(np.float32), faces.astype(np.int32), corner_normals, MeshSource(shape=name))

@@ -7,7 +7,6 @@ keeps its matrix, and the numbers are the nearest ones, to be shown and edited.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -17,8 +16,10 @@ import numpy.typing as npt
 
 from incpt.core import affine
 from incpt.core.affine import Vector
+from incpt.core.arrays import frozen
+from incpt.core.checks import described
 from incpt.core.errors import InputError
-from incpt.scene.checks import LARGEST, checked_number, frozen, set_vector
+from incpt.scene.checks import LARGEST, checked_number, is_list, set_vector
 
 Row = tuple[float, float, float, float]
 Rows = tuple[Row, Row, Row]
@@ -74,8 +75,8 @@ class Transform:
     def world_from_object(self) -> npt.NDArray[np.float64]:
         """(3, 4) affine matrix, which cannot be written to."""
         if self.matrix is not None:
-            return frozen(self.matrix, np.float64)
-        return frozen(affine.compose(self.position, self.rotation, self.scale), np.float64)
+            return frozen(np.array(self.matrix))
+        return frozen(affine.compose(self.position, self.rotation, self.scale))
 
     def with_parts(
         self,
@@ -140,8 +141,8 @@ IDENTITY = Transform()
 
 def _checked_rows(matrix: Any) -> Rows:
     """The upper three rows of a (3, 4) or (4, 4) affine matrix. Raises InputError."""
-    if not _is_list(matrix) or not all(_is_list(row) for row in matrix):
-        raise InputError(f"matrix: {matrix!r} is not a list of rows, each of four numbers")
+    if not is_list(matrix) or not all(is_list(row) for row in matrix):
+        raise InputError(f"matrix: {described(matrix)} is not a list of rows, each of four numbers")
     if len(matrix) not in (3, 4) or any(len(row) != 4 for row in matrix):
         raise InputError("matrix: an affine one has three or four rows of four numbers")
     rows = tuple(tuple(checked_number("matrix", v, -LARGEST, LARGEST) for v in row) for row in matrix)
@@ -152,7 +153,3 @@ def _checked_rows(matrix: Any) -> Rows:
     if lengths.min() < SMALLEST_SCALE or abs(np.linalg.det(linear / lengths)) < SMALLEST_VOLUME:
         raise InputError("matrix: flattens the object; it has no inverse, or hardly one")
     return rows[:3]  # type: ignore[return-value]
-
-
-def _is_list(value: Any) -> bool:
-    return isinstance(value, (Sequence, np.ndarray)) and not isinstance(value, str)
