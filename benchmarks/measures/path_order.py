@@ -66,11 +66,10 @@ class OrderedSession(Session):
         path_buffer = self._state.path_buffer.grown(self.device, wanted, tile_size)
         assert path_buffer.room(tile_size) >= wanted, f"{paths:,} paths do not fit the memory of the device"
         self._state = replace(self._state, path_buffer=path_buffer)
-        params = self._params(path_buffer)
-        params["tile_size"] = slot_width_px
-        filled = self.device.upload(slots)
+        batch = replace(self._batch(slots, path_buffer), path_count=paths)
+        batch.params["tile_size"] = slot_width_px
         self.device.finish()
         began = time.perf_counter()
-        self._tracer.trace(self._tables, params, filled, paths, path_buffer.floats)
+        self._tracer.trace(batch)
         self.device.finish()
         return time.perf_counter() - began

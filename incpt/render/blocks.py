@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
 import pyopencl as cl
 
 from incpt.core import arena, bindings
 from incpt.device.device import Device
-from incpt.render.schedule import scheduled
+from incpt.render.batch import Batch
+from incpt.render.params import launch_params
 from incpt.render.wavefront import Wavefront
 from incpt.tables.scene_tables import SceneTables
 
@@ -30,46 +30,24 @@ class BlockTracer:
         self.device = device
         self._wavefront = Wavefront(device)
 
-    def trace(
-        self,
-        tables: SceneTables,
-        params: npt.NDArray[np.void],
-        slots: cl.Buffer,
-        path_count: int,
-        path_buffer: cl.Buffer,
-        aovs: bool = False,
-    ) -> None:
+    def trace(self, batch: Batch) -> None:
         """See `tracer.Tracer`. No path at all builds the kernel."""
-        whole = scheduled(params, tables)
-        whole["path_count"] = path_count
-        kernel = self.device.kernel("trace_blocks", features=(*tables.variant, *(("AOVS",) if aovs else ())))
-        values = {"params": whole, "slots": slots, "path_buffer": path_buffer}
-        launch(self.device, kernel, bindings.KERNELS["trace_blocks"], path_count, values, tables)
+        tables = batch.tables
+        params = launch_params(batch.params, tables)
+        params["path_count"] = batch.path_count
+        features = (*tables.variant, *(("AOVS",) if batch.aovs else ()))
+        kernel = self.device.kernel("trace_blocks", features=features)
+        values = {"params": params, "slots": batch.slots, "path_buffer": batch.path_buffer}
+        launch(self.device, kernel, bindings.KERNELS["trace_blocks"], batch.path_count, values, tables)
 
-    def first_hits(
-        self,
-        tables: SceneTables,
-        params: npt.NDArray[np.void],
-        slots: cl.Buffer,
-        path_count: int,
-        surface: cl.Buffer,
-        object_ids: cl.Buffer,
-        radiance: cl.Buffer,
-    ) -> None:
+    def first_hits(self, batch: Batch, surface: cl.Buffer, object_ids: cl.Buffer) -> None:
         """See `tracer.Tracer`."""
-        self._wavefront.first_hits(tables, params, slots, path_count, surface, object_ids, radiance)
+        self._wavefront.first_hits(batch, surface, object_ids)
 
-    def idle_launches(
-        self,
-        tables: SceneTables,
-        params: npt.NDArray[np.void],
-        slots: cl.Buffer,
-        path_buffer: cl.Buffer,
-        aovs: bool = False,
-    ) -> list[Callable[[], None]]:
+    def idle_launches(self, batch: Batch) -> list[Callable[[], None]]:
         """See `tracer.Tracer`. A work-item is a block of paths, so that grids are small always."""
-        first_hits = self._wavefront.idle_first_hits(tables, params, slots, path_buffer)
-        return [*first_hits, partial(self.trace, tables, params, slots, 0, path_buffer, aovs)]
+        first_hits = self._wavefront.idle_first_hits(batch)
+        return [*first_hits, partial(self.trace, replace(batch, path_count=0))]
 
 
 def launch(

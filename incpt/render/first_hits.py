@@ -14,7 +14,8 @@ import numpy.typing as npt
 from incpt.core import layout
 from incpt.core.settings import RenderSettings
 from incpt.render import tiles
-from incpt.render.params import launch_params
+from incpt.render.batch import Batch
+from incpt.render.params import path_params
 from incpt.render.plan import Cursor, Queue, plan_step
 from incpt.render.tracer import Tracer
 from incpt.tables.scene_tables import SceneTables
@@ -49,7 +50,7 @@ def first_hits(
     """Those of a picture of `size` (width, height), or of its rows from the first of `rows` up to the second
     only."""
     width, whole_height = size
-    params = launch_params(tables, settings, size)
+    params = path_params(tables, settings, size)
     top, bottom = (0, whole_height) if rows is None else rows
     height = bottom - top
     # The rows are a picture of their own, of a camera that looks a little up or down.
@@ -76,7 +77,7 @@ def object_at(
     tracer: Tracer, tables: SceneTables, settings: RenderSettings, point: tuple[float, float]
 ) -> str | None:
     """The name of the object at a point (x, y) from the top left, in units of the picture, or None."""
-    params = launch_params(tables, settings)
+    params = path_params(tables, settings)
     camera = params["camera"]
     # The point is the centre of a picture of one pixel.
     camera["forward"] += (2 * point[0] - 1) * camera["right"] + (1 - 2 * point[1]) * camera["up"]
@@ -104,7 +105,7 @@ def _traced(
     params["buffer_stride"] = paths + layout.WORK_GROUP_SIZE
     surface, object_ids = device.empty(4 * _SURFACE_PLANES * pixels), device.empty(4 * pixels)
     radiance = device.empty(12 * (paths + layout.WORK_GROUP_SIZE))
-    tracer.first_hits(tables, params, device.upload(slots), paths, surface, object_ids, radiance)
+    tracer.first_hits(Batch(tables, params, device.upload(slots), paths, radiance), surface, object_ids)
     return (
         device.read(surface, np.empty(_SURFACE_PLANES * pixels, np.float32)),
         device.read(object_ids, np.empty(pixels, np.int32)),

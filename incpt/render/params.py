@@ -1,4 +1,4 @@
-"""What every kernel of the path tracer is told of scene, picture and settings."""
+"""What every kernel of the path tracer is told of picture, settings and scene."""
 
 from __future__ import annotations
 
@@ -7,17 +7,19 @@ import numpy.typing as npt
 
 from incpt.core import layout
 from incpt.core.settings import RenderSettings
+from incpt.render.schedule import scheduled
 from incpt.tables.scene_tables import SceneTables
 
 
-def launch_params(
+def path_params(
     tables: SceneTables, settings: RenderSettings, size: tuple[int, int] | None = None
 ) -> npt.NDArray[np.void]:
-    """() layout.PARAMS for a picture of `size` (width, height; that of the settings by default). The caller
-    fills in what depends on its buffers: buffer_stride, and what chooses a chunk of the paths."""
+    """() layout.PARAMS that say which paths there are: the camera, the picture of `size` (width, height; that
+    of the settings by default), the order of its pixels, and how long paths may be. The caller fills in
+    buffer_stride, a tracer what chooses a chunk of the paths, and `launch_params` all that depends on the
+    scene that they are traced in."""
     width, height = settings.size if size is None else size
-    scene = tables.scene
-    camera, environment = scene.camera, scene.environment
+    camera = tables.scene.camera
     params = np.zeros((), layout.PARAMS)
     right, up, forward = camera.image_plane(width / height)
     params["camera"] = (camera.position, right, up, forward)
@@ -25,6 +27,13 @@ def launch_params(
     params["in_squares"] = tables.has_trees
     for name in ("tile_size", "seed", "max_bounces", "transmission_bounces", "roulette_depth"):
         params[name] = getattr(settings, name)
+    return params
+
+
+def launch_params(params: npt.NDArray[np.void], tables: SceneTables) -> npt.NDArray[np.void]:
+    """A copy of `params` with what kernels are told of the scene that the paths are traced in: lights,
+    environment, and which stages it may do without."""
+    params, environment = scheduled(params, tables), tables.scene.environment
     params["light_count"] = tables.light_count
     params["environment_probability"] = tables.environment_probability
     params["environment_color"] = tables.environment_radiance

@@ -20,10 +20,11 @@ from incpt.core.errors import InputError
 from incpt.core.settings import RenderSettings
 from incpt.device.device import Device
 from incpt.render import first_hits, tiles
+from incpt.render.batch import Batch
 from incpt.render.film import RADIANCE, Film, tile_image
 from incpt.render.first_hits import FirstHits
 from incpt.render.modes import Mode
-from incpt.render.params import launch_params
+from incpt.render.params import path_params
 from incpt.render.path_buffer import PathBuffer, slots_of
 from incpt.render.plan import Cursor, Queue
 from incpt.render.progress import Progress
@@ -153,19 +154,16 @@ class Session:
             path_buffer = path_buffer.grown(self.device, slots, settings.tile_size)
             slots = max(1, min(slots, path_buffer.room(settings.tile_size)))
         plan = before.planned(slots_of(settings) if slots is None else slots)
-        params = self._params(path_buffer)
-        filled = self.device.upload(plan.slots)
-        paths = len(plan.slots) * settings.tile_size**2
-        self._tracer.trace(self._tables, params, filled, paths, path_buffer.floats, settings.aovs)
-        traced = TracedStep(self._tracer, self._tables, params, plan, filled, path_buffer.floats)
-        strategy_of(settings).merge(traced, film)
+        batch = self._batch(plan.slots, path_buffer)
+        self._tracer.trace(batch)
+        strategy_of(settings).merge(TracedStep(self._tracer, batch, plan), film)
         nonfinite = film.take_nonfinite()
         self._state = replace(
             self._state, progress=before.after_step(plan, self.scene, film), path_buffer=path_buffer
         )
         seconds = time.perf_counter() - start
         done, length = plan.cursor.tiles, len(before.queue.tiles)
-        return StepReport(before.mode, plan.finished, done, length, paths, seconds, nonfinite)
+        return StepReport(before.mode, plan.finished, done, length, batch.path_count, seconds, nonfinite)
 
     def edit(
         self,
@@ -291,15 +289,13 @@ class Session:
         `on_progress` is called with how many of how many steps are done; not at all if nothing is to do.
         What it raises ends the building, which may go on later."""
         require_call("on_progress", on_progress)
-        aovs = self.settings.aovs
         kernels = (*self._tables.variant, *map(str, passes_of(self.settings)))
         if kernels in self.device.built:
             return
-        film, path_buffer = self._state.film, self._state.path_buffer
-        params, slots = self._params(path_buffer), self.device.upload(first_hits.one_slot())
+        batch = self._batch(first_hits.one_slot(), self._state.path_buffer)
         steps = [
-            *self._tracer.idle_launches(self._tables, params, slots, path_buffer.floats, aovs),
-            *film.idle_launches(params, path_buffer.floats),
+            *self._tracer.idle_launches(batch),
+            *self._state.film.idle_launches(batch.params, batch.path_buffer),
         ]
         for done, step in enumerate(steps, 1):
             step()
@@ -332,10 +328,13 @@ class Session:
         progress = state.progress.with_settings(settings, self.scene, state.film)
         return SessionState(progress, state.film, path_buffer, state.tables)
 
-    def _params(self, path_buffer: PathBuffer) -> npt.NDArray[np.void]:
-        params = launch_params(self._tables, self.settings)
+    def _batch(self, slots: npt.NDArray[np.void], path_buffer: PathBuffer) -> Batch:
+        """All paths of these slots (layout.SLOT), in the scene as it is now."""
+        settings = self.settings
+        params = path_params(self._tables, settings)
         params["buffer_stride"] = path_buffer.stride
-        return params
+        paths, filled = len(slots) * settings.tile_size**2, self.device.upload(slots)
+        return Batch(self._tables, params, filled, paths, path_buffer.floats, settings.aovs)
 
 
 def _point(pixel: tuple[float, float] | None) -> tuple[float, float] | None:

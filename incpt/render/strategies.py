@@ -23,12 +23,11 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 import numpy as np
-import numpy.typing as npt
-import pyopencl as cl
 
 from incpt.core import affine
 from incpt.core.settings import RenderSettings
 from incpt.render import tiles
+from incpt.render.batch import Batch
 from incpt.render.film import AOVS, RADIANCE, Film, FilmPass, Float32Array
 from incpt.render.modes import Mode
 from incpt.render.plan import CountArray, Plan, Queue
@@ -36,7 +35,6 @@ from incpt.render.tiles import IntArray, TileGrid
 from incpt.render.tracer import Tracer
 from incpt.scene.camera import Camera
 from incpt.scene.model import Object, Scene
-from incpt.tables.scene_tables import SceneTables
 
 
 class FilmSums(Protocol):
@@ -78,21 +76,15 @@ class Situation:
 class TracedStep:
     """A step whose paths are traced.
 
-    tracer   what traced them, and could trace others.
-    tables   the scene that they were traced in.
-    params   () layout.PARAMS they were traced with.
-    plan     which tile and sample is in which slot.
-    slots    the slots of the plan, on the device.
-    samples  the path buffer: what the paths brought, a plane for each channel of each pass of the film.
-             The tracer fills those of radiance and of auxiliary images.
+    tracer  what traced them, and could trace others.
+    batch   the paths, in the scene that they were traced in. Its path buffer has a plane for each channel of
+            each pass of the film, of which the tracer has filled those of radiance and of auxiliary images.
+    plan    which tile and sample is in which of its slots.
     """
 
     tracer: Tracer
-    tables: SceneTables
-    params: npt.NDArray[np.void]
+    batch: Batch
     plan: Plan
-    slots: cl.Buffer
-    samples: cl.Buffer
 
 
 class Strategy(ABC):
@@ -128,10 +120,11 @@ class Strategy(ABC):
 
     def merge(self, step: TracedStep, film: Film) -> None:
         """Job 3: put what a step traced into the film. It may launch kernels of its own over all that the
-        step and the film hold, such as paths in an older scene from the same slots, whose results go into
-        passes of its own; `Film.first_plane` tells where their planes begin. By default each pass gets its
-        planes of the path buffer."""
-        film.reduce(step.params, step.plan, step.slots, step.samples)
+        step and the film hold, or trace the paths of `step.batch` again in the tables of an older scene, and
+        put the results into passes of its own; `Film.first_plane` tells where their planes begin. By default
+        each pass gets its planes of the path buffer."""
+        batch = step.batch
+        film.reduce(batch.params, step.plan, batch.slots, batch.path_buffer)
 
     def image(self, film: Film) -> Float32Array:
         """Job 3: (height, width, 4) the picture that the film shows: mean radiance, linear, and 1 where there

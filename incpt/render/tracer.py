@@ -6,14 +6,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-import numpy as np
-import numpy.typing as npt
 import pyopencl as cl
 
 from incpt.device.device import Device
+from incpt.render.batch import Batch
 from incpt.render.blocks import BlockTracer, traces_in_blocks
 from incpt.render.wavefront import Wavefront
-from incpt.tables.scene_tables import SceneTables
 
 
 class Tracer(Protocol):
@@ -21,41 +19,17 @@ class Tracer(Protocol):
 
     device: Device
 
-    def trace(
-        self,
-        tables: SceneTables,
-        params: npt.NDArray[np.void],
-        slots: cl.Buffer,
-        path_count: int,
-        path_buffer: cl.Buffer,
-        aovs: bool = False,
-    ) -> None:
-        """Trace `path_count` paths, those of `slots` in order; `path_buffer` gets what each brings, as planes
-        of params["buffer_stride"] floats: those of radiance in layout.SamplePlane, with `aovs` all of
-        them."""
+    def trace(self, batch: Batch) -> None:
+        """Trace the paths of a batch into its path buffer."""
 
-    def first_hits(
-        self,
-        tables: SceneTables,
-        params: npt.NDArray[np.void],
-        slots: cl.Buffer,
-        path_count: int,
-        surface: cl.Buffer,
-        object_ids: cl.Buffer,
-        radiance: cl.Buffer,
-    ) -> None:
-        """What camera rays meet: `surface` and `object_ids` as cl/film/first_hits.cl fills them."""
+    def first_hits(self, batch: Batch, surface: cl.Buffer, object_ids: cl.Buffer) -> None:
+        """What the camera rays of a batch meet: `surface` and `object_ids` as cl/film/first_hits.cl fills
+        them. Of its path buffer the planes of radiance are needed, and hold nothing of use afterwards."""
 
-    def idle_launches(
-        self,
-        tables: SceneTables,
-        params: npt.NDArray[np.void],
-        slots: cl.Buffer,
-        path_buffer: cl.Buffer,
-        aovs: bool = False,
-    ) -> list[Callable[[], None]]:
-        """A launch of every kernel that `trace` and `first_hits` may need for these tables, each with nothing
-        to do; see `Device.built`. `slots` holds one slot, which lanes without a path read."""
+    def idle_launches(self, batch: Batch) -> list[Callable[[], None]]:
+        """A launch of every kernel that `trace` and `first_hits` may need for batches with these tables and
+        auxiliary images, each with nothing to do; see `Device.built`. `batch` has one slot, which lanes
+        without a path read; none of its paths is traced."""
 
 
 def tracer_of(device: Device) -> Tracer:

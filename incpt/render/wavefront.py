@@ -28,7 +28,8 @@ import pyopencl as cl
 from incpt.core import bindings, layout
 from incpt.core.layout import PathClass, PathList
 from incpt.device.device import BUILD_SIZES, Device
-from incpt.render.schedule import scheduled
+from incpt.render.batch import Batch
+from incpt.render.params import launch_params
 from incpt.tables.scene_tables import SceneTables
 
 _RAYS_AHEAD = 2
@@ -52,15 +53,16 @@ _NEW_LISTS = 3
 """Lists that `compact` appends to at a time."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Chunk:
-    """Paths that are traced together: in which scene, by which settings, where they leave what they bring,
-    and whether auxiliary images are part of it."""
+    """Paths of a batch whose state is on the device at the same time; `params` are their launches'."""
 
-    tables: SceneTables
+    batch: Batch
     params: npt.NDArray[np.void]
-    path_buffer: cl.Buffer
-    aovs: bool = False
+
+    @property
+    def tables(self) -> SceneTables:
+        return self.batch.tables
 
     @property
     def size(self) -> int:
@@ -86,69 +88,41 @@ class Wavefront:
         self._lengths = device.empty(4 * len(PathList) * (layout.MOST_RAYS + 1))
         self._least_size = 1
 
-    def trace(
-        self,
-        tables: SceneTables,
-        params: npt.NDArray[np.void],
-        slots: cl.Buffer,
-        path_count: int,
-        path_buffer: cl.Buffer,
-        aovs: bool = False,
-    ) -> None:
+    def trace(self, batch: Batch) -> None:
         """See `tracer.Tracer`."""
-        for chunk in self._chunks(tables, params, path_count, path_buffer, aovs):
-            self._trace_chunk(chunk, slots)
+        for chunk in self._chunks(batch):
+            self._trace_chunk(chunk)
 
-    def first_hits(
-        self,
-        tables: SceneTables,
-        params: npt.NDArray[np.void],
-        slots: cl.Buffer,
-        path_count: int,
-        surface: cl.Buffer,
-        object_ids: cl.Buffer,
-        radiance: cl.Buffer,
-    ) -> None:
-        """What camera rays meet: `surface` and `object_ids` as cl/film/first_hits.cl fills them."""
-        for chunk in self._chunks(tables, params, path_count, radiance):
-            self._generate(chunk, slots)
+    def first_hits(self, batch: Batch, surface: cl.Buffer, object_ids: cl.Buffer) -> None:
+        """See `tracer.Tracer`."""
+        for chunk in self._chunks(batch):
+            self._generate(chunk)
             self._intersect(chunk, 0, chunk.size)
             self._first_hits(chunk, surface, object_ids)
 
-    def idle_launches(
-        self,
-        tables: SceneTables,
-        params: npt.NDArray[np.void],
-        slots: cl.Buffer,
-        path_buffer: cl.Buffer,
-        aovs: bool = False,
-    ) -> list[Callable[[], None]]:
-        """A launch of every kernel that `trace` and `first_hits` may need for this scene, each with nothing
-        to do; see `Device.built`. `slots` holds one slot, which lanes without a path read."""
-        chunk = self._chunk(tables, params, 0, 0, path_buffer)
+    def idle_launches(self, batch: Batch) -> list[Callable[[], None]]:
+        """See `tracer.Tracer`."""
+        chunk = self._chunk(batch, 0, 0)
         stages: list[Callable[[], object]] = [
             partial(self._sample_lights, chunk, 0, 0, PathList.SURFACE),
             partial(self._shade, chunk, 0, 0),
             partial(self._trace_shadows, chunk, 0, 0),
             partial(self._shade_misses, chunk, 0, 0),
         ]
-        if tables.has_media:
+        if chunk.tables.has_media:
             stages.append(partial(self._shade_media, chunk, 0, 0))
         else:
             stages.append(partial(self._shade, chunk, 0, 0, last=True))
-        if aovs:
+        if batch.aovs:
             stages.append(partial(self._write_aovs, chunk, 0))
-        return [*self.idle_first_hits(tables, params, slots, path_buffer), *self._idle(stages)]
+        return [*self.idle_first_hits(batch), *self._idle(stages)]
 
-    def idle_first_hits(
-        self, tables: SceneTables, params: npt.NDArray[np.void], slots: cl.Buffer, radiance: cl.Buffer
-    ) -> list[Callable[[], None]]:
+    def idle_first_hits(self, batch: Batch) -> list[Callable[[], None]]:
         """As `idle_launches`, of the kernels that `first_hits` needs alone."""
-        chunk = self._chunk(tables, params, 0, 0, radiance)
-        nothing = self._lengths
+        chunk, nothing = self._chunk(batch, 0, 0), self._lengths
         return self._idle(
             [
-                partial(self._generate, chunk, slots),
+                partial(self._generate, chunk),
                 partial(self._intersect, chunk, 0, 0),
                 partial(self._first_hits, chunk, nothing, nothing),
             ]
@@ -165,34 +139,19 @@ class Wavefront:
         finally:
             self._least_size = 1
 
-    def _chunks(
-        self,
-        tables: SceneTables,
-        params: npt.NDArray[np.void],
-        path_count: int,
-        path_buffer: cl.Buffer,
-        aovs: bool = False,
-    ) -> list[_Chunk]:
+    def _chunks(self, batch: Batch) -> list[_Chunk]:
         return [
-            self._chunk(tables, params, first, min(self.chunk_paths, path_count - first), path_buffer, aovs)
-            for first in range(0, path_count, self.chunk_paths)
+            self._chunk(batch, first, min(self.chunk_paths, batch.path_count - first))
+            for first in range(0, batch.path_count, self.chunk_paths)
         ]
 
-    def _chunk(
-        self,
-        tables: SceneTables,
-        params: npt.NDArray[np.void],
-        first: int,
-        size: int,
-        path_buffer: cl.Buffer,
-        aovs: bool = False,
-    ) -> _Chunk:
-        own = scheduled(params, tables)
-        own["first_path"], own["path_count"], own["path_stride"] = first, size, self.stride
-        return _Chunk(tables, own, path_buffer, aovs)
+    def _chunk(self, batch: Batch, first: int, size: int) -> _Chunk:
+        params = launch_params(batch.params, batch.tables)
+        params["first_path"], params["path_count"], params["path_stride"] = first, size, self.stride
+        return _Chunk(batch, params)
 
-    def _trace_chunk(self, chunk: _Chunk, slots: cl.Buffer) -> None:
-        self._generate(chunk, slots)
+    def _trace_chunk(self, chunk: _Chunk) -> None:
+        self._generate(chunk)
         bound = chunk.size
         left: deque[tuple[cl.Event, npt.NDArray[np.uint32]]] = deque()
         for ray in range(int(chunk.params["last_ray"]) + 1):
@@ -211,7 +170,7 @@ class Wavefront:
         """Ray number `ray` of every live path, which are `bound` at most."""
         last = ray == int(chunk.params["last_ray"])
         self._intersect(chunk, ray, bound)
-        if chunk.aovs and ray == 0:
+        if chunk.batch.aovs and ray == 0:
             self._write_aovs(chunk, bound)
         listed = [(path_list, ray) for path_list in (PathList.SURFACE, PathList.MISS, PathList.MEDIUM)]
         self._compact(chunk, ray, bound, PathList.LIVE, *listed)
@@ -227,9 +186,9 @@ class Wavefront:
             self._compact(chunk, ray, bound, PathList.LIVE, (PathList.SHADOW, ray), (PathList.LIVE, ray + 1))
             self._trace_shadows(chunk, ray, bound)
 
-    def _generate(self, chunk: _Chunk, slots: cl.Buffer) -> None:
+    def _generate(self, chunk: _Chunk) -> None:
         """Start the paths of a chunk, and list those that lie in the image."""
-        self._launch("generate", chunk, chunk.size, slots=slots)
+        self._launch("generate", chunk, chunk.size, slots=chunk.batch.slots)
         self.device.fill(self._lengths, 0, self._lengths.size)
         self._compact(chunk, 0, chunk.size, None, (PathList.LIVE, 0))
 
@@ -306,7 +265,7 @@ class Wavefront:
     ) -> None:
         """Launch a kernel; its arguments are `values` by name, the planes of paths, and the buffers of the
         scene."""
-        known = {**self._planes, "params": chunk.params, "radiance": chunk.path_buffer, **values}
+        known = {**self._planes, "params": chunk.params, "radiance": chunk.batch.path_buffer, **values}
         arguments = bindings.arguments(bindings.KERNELS[name], known, chunk.tables)
         kernel = self.device.kernel(name, features=features)
         self.device.launch(kernel, max(size, self._least_size), *arguments)

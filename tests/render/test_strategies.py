@@ -107,10 +107,9 @@ class Probe(Strategy):
         return 1 + order % 3 + int(count.max())
 
     def merge(self, step: TracedStep, film: Film) -> None:
-        device, stride = film.device, int(step.params["buffer_stride"])
-        device.write(
-            step.samples, np.full(stride, 2.0, np.float32), offset=4 * film.first_plane("traces") * stride
-        )
+        batch, stride = step.batch, int(step.batch.params["buffer_stride"])
+        place = 4 * film.first_plane("traces") * stride
+        film.device.write(batch.path_buffer, np.full(stride, 2.0, np.float32), offset=place)
         super().merge(step, film)
 
 

@@ -1,0 +1,34 @@
+"""Paths that are traced together: what a tracer is asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from incpt.tables.scene_tables import SceneTables
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Paths to trace, those of `slots` in order, and where they leave what they bring.
+
+    tables       the scene that they are traced in.
+    params       () layout.PARAMS as `params.path_params` makes them: which paths these are. What follows from
+                 the tables is not in them, so that `replace(batch, tables=others)` are the same paths, pixel
+                 by pixel and sample by sample, in another scene.
+    slots        layout.SLOT on the device: which tile and which samples are in which slot.
+    path_count   how many paths these are; tracing takes no others of `slots`.
+    path_buffer  planes of params["buffer_stride"] floats, which get what each path brings: those of radiance
+                 in layout.SamplePlane, with `aovs` all of them.
+    aovs         whether auxiliary images are part of it.
+    """
+
+    tables: SceneTables
+    params: npt.NDArray[np.void]
+    slots: cl.Buffer
+    path_count: int
+    path_buffer: cl.Buffer
+    aovs: bool = False
