@@ -244,8 +244,8 @@ static void clear_lane(__global TrianglePack *pack, uint lane_index) {
     pack->object[lane_index] = NO_INDEX;
 }
 
-__kernel void bound_faces(const uint count, __global const int *faces, __global const float *vertices,
-                          __global Box *boxes) {
+// Boxes around all faces of a mesh.
+__kernel void bound_faces(ITEMS_PARAMETERS, MESH_PARAMETERS, BOXES_PARAMETERS) {
     const uint i = get_global_id(0);
     if (i >= count)
         return;
@@ -254,43 +254,39 @@ __kernel void bound_faces(const uint count, __global const int *faces, __global 
     boxes[i] = box;
 }
 
-// What surrounds the boxes, and the centres, of chunk i: [start, start + count) in `chunks`.
-__kernel void measure_chunks(const uint count, __global const uint *chunks, __global const Box *boxes,
-                             __global Box *bounds) {
+// What surrounds the boxes, and the centres, of each chunk.
+__kernel void measure_chunks(ITEMS_PARAMETERS, BOXES_PARAMETERS, CHUNKS_PARAMETERS, MEASURES_PARAMETERS) {
     const uint i = get_global_id(0);
     if (i >= count)
         return;
     const Range range = range_around(boxes, chunks[2 * i], chunks[2 * i + 1]);
-    bounds[2 * i] = range.bounds;
-    bounds[2 * i + 1] = range.centers;
+    measures[2 * i] = range.bounds;
+    measures[2 * i + 1] = range.centers;
 }
 
-__kernel void bin_chunks(const uint count, const float origin_x, const float origin_y, const float origin_z,
-                         const float scale_x, const float scale_y, const float scale_z,
-                         __global const uint *chunks, __global const Box *boxes, __global Box *all_bins,
-                         __global uint *all_counts) {
+// Joins the boxes of each chunk in bins by their centres.
+__kernel void bin_chunks(ITEMS_PARAMETERS, BOXES_PARAMETERS, CHUNKS_PARAMETERS, BINS_PARAMETERS) {
     const uint i = get_global_id(0);
     if (i >= count)
         return;
     const float origin[3] = {origin_x, origin_y, origin_z}, scale[3] = {scale_x, scale_y, scale_z};
-    Box bins[3 * BVH_BINS];
-    uint counts[3 * BVH_BINS];
-    fill_bins(boxes, chunks[2 * i], chunks[2 * i + 1], origin, scale, bins, counts);
+    Box own_bins[3 * BVH_BINS];
+    uint own_counts[3 * BVH_BINS];
+    fill_bins(boxes, chunks[2 * i], chunks[2 * i + 1], origin, scale, own_bins, own_counts);
     for (uint bin = 0; bin < 3 * BVH_BINS; bin++) {
-        all_bins[3 * BVH_BINS * i + bin] = bins[bin];
-        all_counts[3 * BVH_BINS * i + bin] = counts[bin];
+        bins[3 * BVH_BINS * i + bin] = own_bins[bin];
+        bin_counts[3 * BVH_BINS * i + bin] = own_counts[bin];
     }
 }
 
-// Moves the boxes of chunk i to `moved`: those of lower bins to offsets[2 * i] and on, the others to
-// offsets[2 * i + 1] and on.
-__kernel void scatter_chunks(const uint count, const uint axis, const uint position, const float origin,
-                             const float scale, __global const uint *chunks, __global const uint *offsets,
-                             __global const Box *boxes, __global Box *moved) {
+// Moves the boxes of chunk i to `moved`: those of lower bins to sides[2 * i] and on, the others to
+// sides[2 * i + 1] and on.
+__kernel void scatter_chunks(ITEMS_PARAMETERS, BOXES_PARAMETERS, CHUNKS_PARAMETERS, SIDES_PARAMETERS,
+                             MOVED_PARAMETERS) {
     const uint i = get_global_id(0);
     if (i >= count)
         return;
-    uint left = offsets[2 * i], right = offsets[2 * i + 1];
+    uint left = sides[2 * i], right = sides[2 * i + 1];
     for (uint k = chunks[2 * i]; k < chunks[2 * i] + chunks[2 * i + 1]; k++) {
         const Box box = boxes[k];
         if (bin_of(lane(CENTER(box), axis), origin, scale) < position)
@@ -300,21 +296,19 @@ __kernel void scatter_chunks(const uint count, const uint axis, const uint posit
     }
 }
 
-__kernel void copy_chunks(const uint count, __global const uint *chunks, __global const Box *from,
-                          __global Box *to) {
+// Copies the boxes of each chunk back from `moved`.
+__kernel void copy_chunks(ITEMS_PARAMETERS, BOXES_PARAMETERS, CHUNKS_PARAMETERS, MOVED_PARAMETERS) {
     const uint i = get_global_id(0);
     if (i >= count)
         return;
     for (uint k = chunks[2 * i]; k < chunks[2 * i] + chunks[2 * i + 1]; k++)
-        to[k] = from[k];
+        boxes[k] = moved[k];
 }
 
 // Splits range i of a level into the children of node i. `children` gets start and count of each (count 0:
-// none), `counts` the number of inner children and of leaves. A range above `capacity` would not
+// none), `child_counts` the number of inner children and of leaves. A range above `capacity` would not
 // fit the levels that are left unless it is split evenly; one above `largest` is left to the host.
-__kernel void split_ranges(const uint count, const uint leaf_size, const uint capacity, const uint largest,
-                           __global Box *boxes, __global const uint *ranges, __global Node *nodes,
-                           __global uint *children, __global uint *counts) {
+__kernel void split_ranges(ITEMS_PARAMETERS, BOXES_PARAMETERS, LEVEL_PARAMETERS, SPLITTING_PARAMETERS) {
     const uint i = get_global_id(0);
     if (i >= count || ranges[2 * i + 1] > largest)
         return;
@@ -334,16 +328,16 @@ __kernel void split_ranges(const uint count, const uint leaf_size, const uint ca
             halve(boxes, range, &parts[chosen], &parts[part_count]);
         part_count++;
     }
-    uint leaves = 0;
+    uint leaf_count = 0;
     for (uint child = 0; child < BVH_WIDTH; child++) {
         const bool used = child < part_count && parts[child].count > 0;
-        leaves += used && parts[child].count <= leaf_size;
-        write_bounds(nodes + i, child, used ? parts[child].bounds : BOX_EMPTY);
+        leaf_count += used && parts[child].count <= leaf_size;
+        write_bounds(level_nodes + i, child, used ? parts[child].bounds : BOX_EMPTY);
         children[2 * (BVH_WIDTH * i + child)] = used ? parts[child].start : 0;
         children[2 * (BVH_WIDTH * i + child) + 1] = used ? parts[child].count : 0;
     }
-    counts[2 * i] = part_count - leaves;
-    counts[2 * i + 1] = leaves;
+    child_counts[2 * i] = part_count - leaf_count;
+    child_counts[2 * i + 1] = leaf_count;
 }
 
 // Sorts the children of a node for rays into each octant, by the centres of their boxes. A ray into the
@@ -376,16 +370,13 @@ static void write_order(__global Node *node) {
 }
 
 // Refers node i to its children: inner ones become ranges of the next level, leaves packs or objects.
-// `offsets` holds, for each node, the number of inner children and of leaves of the nodes before it.
-__kernel void link_children(const uint count, const uint leaf_size, const uint next_node,
-                            const uint next_pack, __global const Box *boxes, __global const uint *children,
-                            __global const uint *offsets, __global Node *nodes, __global uint *next_ranges,
-                            __global TrianglePack *packs, __global const int *faces,
-                            __global const float *vertices) {
+// `before` holds, for each node, the number of inner children and of leaves of the nodes before it.
+__kernel void link_children(ITEMS_PARAMETERS, MESH_PARAMETERS, BOXES_PARAMETERS, LEVEL_PARAMETERS,
+                            LINKING_PARAMETERS, LEAVES_PARAMETERS) {
     const uint i = get_global_id(0);
     if (i >= count)
         return;
-    uint inner = offsets[2 * i], leaf = offsets[2 * i + 1];
+    uint inner = before[2 * i], leaf = before[2 * i + 1];
     for (uint child = 0; child < BVH_WIDTH; child++) {
         const uint start = children[2 * (BVH_WIDTH * i + child)];
         const uint size = children[2 * (BVH_WIDTH * i + child) + 1];
@@ -401,49 +392,48 @@ __kernel void link_children(const uint count, const uint leaf_size, const uint n
             reference = NODE_LEAF | (next_pack + leaf);
             for (uint k = 0; k < BVH_WIDTH; k++)
                 if (k < size)
-                    write_face(packs + leaf, k, faces, vertices, as_uint(boxes[start + k].s3));
+                    write_face(leaf_packs + leaf, k, faces, vertices, as_uint(boxes[start + k].s3));
                 else
-                    clear_lane(packs + leaf, k);
+                    clear_lane(leaf_packs + leaf, k);
             leaf++;
         }
-        nodes[i].child[child] = reference;
+        level_nodes[i].child[child] = reference;
     }
-    write_order(nodes + i);
+    write_order(level_nodes + i);
 }
 
-__kernel void refit_packs(const uint count, __global TrianglePack *packs, __global const int *faces,
-                          __global const float *vertices) {
+// Gives the faces in the leaves of a tree the vertices of another mesh.
+__kernel void refit_packs(ITEMS_PARAMETERS, MESH_PARAMETERS, LEAVES_PARAMETERS) {
     const uint i = get_global_id(0);
     if (i >= count)
         return;
     for (uint k = 0; k < BVH_WIDTH; k++)
-        if (packs[i].face[k] != NO_INDEX)
-            write_face(packs + i, k, faces, vertices, packs[i].face[k]);
+        if (leaf_packs[i].face[k] != NO_INDEX)
+            write_face(leaf_packs + i, k, faces, vertices, leaf_packs[i].face[k]);
 }
 
-// Fits the boxes of nodes [first, first + count), whose inner children are done already.
-__kernel void refit_nodes(const uint count, const uint first, __global Node *nodes,
-                          __global const TrianglePack *packs, __global const int *faces,
-                          __global const float *vertices) {
+// Fits the boxes of nodes [first_node, first_node + count), whose inner children are done already.
+__kernel void refit_nodes(ITEMS_PARAMETERS, MESH_PARAMETERS, LEAVES_PARAMETERS, REFITTING_PARAMETERS) {
     const uint i = get_global_id(0);
     if (i >= count)
         return;
+    __global Node *node = tree_nodes + first_node + i;
     for (uint child = 0; child < BVH_WIDTH; child++) {
-        const uint reference = nodes[first + i].child[child];
+        const uint reference = node->child[child];
         Box box = BOX_EMPTY;
         if (reference == NODE_EMPTY)
             continue;
         for (uint k = 0; k < BVH_WIDTH; k++) {
             if (reference & NODE_LEAF) {
-                const uint face = packs[reference & ~NODE_LEAF].face[k];
+                const uint face = leaf_packs[reference & ~NODE_LEAF].face[k];
                 if (face != NO_INDEX)
                     box = JOIN(box, face_box(faces, vertices, face));
             } else {
-                __global const float *b = &nodes[reference].bounds[0][k];
+                __global const float *b = &tree_nodes[reference].bounds[0][k];
                 box = JOIN(box, (Box)(b[0], b[16], b[32], 0.0f, -b[8], -b[24], -b[40], 0.0f));
             }
         }
-        write_bounds(nodes + first + i, child, box);
+        write_bounds(node, child, box);
     }
-    write_order(nodes + first + i);
+    write_order(node);
 }

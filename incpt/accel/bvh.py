@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core import layout
+from incpt.core import bindings, layout
 from incpt.core.errors import InputError
 from incpt.device.device import Device
 from incpt.scene.mesh import Mesh
@@ -66,9 +66,7 @@ def build_triangles(device: Device, vertices: npt.NDArray[np.float32], faces: np
     count = len(faces)
     vertex_buffer, face_buffer = device.upload(vertices), device.upload(faces)
     boxes = device.empty(count * 32)
-    device.launch(
-        device.kernel("bound_faces", _FILE), count, np.uint32(count), face_buffer, vertex_buffer, boxes
-    )
+    _launch(device, "bound_faces", count, faces=face_buffer, vertices=vertex_buffer, boxes=boxes)
     return build_boxes(device, count, layout.BVH_WIDTH, boxes, face_buffer, vertex_buffer)
 
 
@@ -80,14 +78,12 @@ def refit_mesh(device: Device, bvh: Bvh, mesh: Mesh) -> Bvh:
     """
     if np.count_nonzero(bvh.packs["face"] != layout.NO_INDEX) != len(mesh.faces):
         raise InputError(f"mesh: has {len(mesh.faces)} faces, its tree another number; build it anew")
-    vertices, faces = device.upload(mesh.vertices), device.upload(mesh.faces)
     nodes, packs = device.upload(bvh.nodes), device.upload(bvh.packs)
-    count = len(bvh.packs)
-    device.launch(device.kernel("refit_packs", _FILE), count, np.uint32(count), packs, faces, vertices)
-    kernel = device.kernel("refit_nodes", _FILE)
+    vertices, faces = device.upload(mesh.vertices), device.upload(mesh.faces)
+    tree: dict[str, Any] = {"faces": faces, "vertices": vertices, "leaf_packs": packs}
+    _launch(device, "refit_packs", len(bvh.packs), **tree)
     for first, end in reversed(list(zip(bvh.levels, bvh.levels[1:], strict=False))):
-        size = end - first
-        device.launch(kernel, size, np.uint32(size), np.uint32(first), nodes, packs, faces, vertices)
+        _launch(device, "refit_nodes", end - first, first_node=first, tree_nodes=nodes, **tree)
     new_nodes = device.read(nodes, np.empty_like(bvh.nodes))
     new_packs = device.read(packs, np.empty_like(bvh.packs))
     return Bvh(new_nodes, new_packs, bvh.levels, root_bounds(new_nodes))
@@ -144,6 +140,12 @@ def build_boxes(
     return Bvh(all_nodes, np.concatenate(packs), tuple(levels), root_bounds(all_nodes))
 
 
+def _launch(device: Device, name: str, count: int, work_group: int | None = None, **values: Any) -> None:
+    """Launch a kernel of the builder over `count` work-items; `values` are its other arguments."""
+    arguments = bindings.arguments(bindings.KERNELS[name], {"count": count, **values})
+    device.launch(device.kernel(name, _FILE), count, *arguments, work_group=work_group)
+
+
 class _Level:
     """The device buffers of one level while it is being built."""
 
@@ -153,16 +155,15 @@ class _Level:
         self.children = device.empty(count * layout.BVH_WIDTH * 8)
         self.counts = device.empty(count * 8)
         self.nodes_array = np.empty(count, layout.NODE)
+        self._level = {"leaf_size": leaf_size, "level_nodes": self.nodes, "children": self.children}
 
     def split(self, boxes: Any, ranges: Any, capacity: int) -> None:
         """Splits every range but those that are left to `split_large`."""
-        device = self.device
-        sizes = (np.uint32(n) for n in (self.count, self.leaf_size, capacity, LARGEST_SERIAL_RANGE))
-        buffers = boxes, ranges, self.nodes, self.children, self.counts
-        kernel = device.kernel("split_ranges", _FILE)
+        values = {"boxes": boxes, "ranges": ranges, "child_counts": self.counts, **self._level}
+        values |= {"capacity": capacity, "largest": LARGEST_SERIAL_RANGE}
         # Ranges differ in size by far: a group of its own for each spreads them best over the cores.
-        group = 1 if device.is_cpu else None
-        device.launch(kernel, self.count, *sizes, *buffers, work_group=group)
+        group = 1 if self.device.is_cpu else None
+        _launch(self.device, "split_ranges", self.count, group, **values)
 
     def split_large(self, splitter: _Splitter, ranges: Any, capacity: int) -> bool:
         """Splits the ranges that are too large for one work-item. False where there are none."""
@@ -214,9 +215,9 @@ class _Level:
         device = self.device
         packs_array = np.empty(leaves if self.leaf_size > 1 else 0, layout.TRIANGLE_PACK)
         packs = device.empty(packs_array.nbytes)
-        sizes = (np.uint32(n) for n in (self.count, self.leaf_size, next_node, next_pack))
-        buffers = boxes, self.children, device.upload(offsets), self.nodes, next_ranges, packs
-        device.launch(device.kernel("link_children", _FILE), self.count, *sizes, *buffers, *mesh)
+        values = {"boxes": boxes, "before": device.upload(offsets), "leaf_packs": packs, **self._level}
+        values |= {"next_node": next_node, "next_pack": next_pack, "next_ranges": next_ranges}
+        _launch(device, "link_children", self.count, faces=mesh[0], vertices=mesh[1], **values)
         device.read(self.nodes, self.nodes_array)
         if len(packs_array):
             device.read(packs, packs_array)
@@ -255,15 +256,15 @@ class _Splitter:
             parts.append(self._measure(middle, part.start + part.count - middle))
         return parts
 
-    def _launch(self, name: str, count: int, *args: Any) -> None:
+    def _launch(self, name: str, count: int, **values: Any) -> None:
         group = 1 if self.device.is_cpu else None
-        self.device.launch(self.device.kernel(name, _FILE), count, np.uint32(count), *args, work_group=group)
+        _launch(self.device, name, count, group, boxes=self.boxes, **values)
 
     def _measure(self, start: int, count: int) -> _Part:
         chunks = _chunks(start, count)
-        bounds = self.device.empty(len(chunks) * 64)
-        self._launch("measure_chunks", len(chunks), self.device.upload(chunks), self.boxes, bounds)
-        least = self.device.read(bounds, np.empty((len(chunks), 2, 8), np.float32)).min(axis=0)
+        measures = self.device.empty(len(chunks) * 64)
+        self._launch("measure_chunks", len(chunks), chunks=self.device.upload(chunks), measures=measures)
+        least = self.device.read(measures, np.empty((len(chunks), 2, 8), np.float32)).min(axis=0)
         return _Part(start, count, least[0], least[1])
 
     def _partition(self, part: _Part) -> int:
@@ -284,11 +285,11 @@ class _Splitter:
         left = counts[:, axis, :position].sum(axis=1, dtype=np.uint32)
         lower = int(left.sum())
         before = np.cumsum(left, dtype=np.uint32) - left
-        offsets = np.stack([part.start + before, lower + chunks[:, 0] - before], axis=1).astype(np.uint32)
-        numbers = np.uint32(axis), np.uint32(position), origin[axis], scale[axis]
-        buffers = chunk_buffer, device.upload(offsets), self.boxes, self.moved
-        self._launch("scatter_chunks", len(chunks), *numbers, *buffers)
-        self._launch("copy_chunks", len(chunks), chunk_buffer, self.moved, self.boxes)
+        sides = np.stack([part.start + before, lower + chunks[:, 0] - before], axis=1).astype(np.uint32)
+        buffers = {"chunks": chunk_buffer, "moved": self.moved}
+        plane = {"axis": axis, "position": position, "origin": origin[axis], "scale": scale[axis]}
+        self._launch("scatter_chunks", len(chunks), sides=device.upload(sides), **plane, **buffers)
+        self._launch("copy_chunks", len(chunks), **buffers)
         return lower
 
     def _bin(
@@ -297,7 +298,9 @@ class _Splitter:
         """Boxes of the bins (3, bins, 8), and how many boxes each chunk put in them (count, 3, bins)."""
         bin_buffer = self.device.empty(count * 3 * layout.BVH_BINS * 32)
         count_buffer = self.device.empty(count * 3 * layout.BVH_BINS * 4)
-        self._launch("bin_chunks", count, *origin, *scale, chunks, self.boxes, bin_buffer, count_buffer)
+        axes = {f"origin_{axis}": value for axis, value in zip("xyz", origin, strict=True)}
+        axes |= {f"scale_{axis}": value for axis, value in zip("xyz", scale, strict=True)}
+        self._launch("bin_chunks", count, chunks=chunks, bins=bin_buffer, bin_counts=count_buffer, **axes)
         bins = self.device.read(bin_buffer, np.empty((count, 3, layout.BVH_BINS, 8), np.float32))
         counts = self.device.read(count_buffer, np.empty((count, 3, layout.BVH_BINS), np.uint32))
         return bins.min(axis=0), counts

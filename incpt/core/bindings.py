@@ -66,6 +66,14 @@ def _count(name: str, holds: str) -> Argument:
     return Argument(name, "uint", holds)
 
 
+def _number(name: str, holds: str) -> Argument:
+    return Argument(name, "float", holds)
+
+
+_SCALARS = {"uint": np.uint32, "float": np.float32}
+"""What Python's numbers become for a parameter of that type."""
+
+
 LAUNCH = Group("LAUNCH", None, (Argument("params", "Params", "the settings of this launch"),))
 
 SLOTS = Group("SLOTS", None, (_table("slots", "Slot", "which tile and which samples are in which slot"),))
@@ -198,9 +206,107 @@ RESOLUTION = Group(
     ),
 )
 
+# Of the builder of trees, cl/accel/build_bvh.cl, where Box is declared.
+
+ITEMS = Group(
+    "ITEMS", None, (_count("count", "of what the kernel goes over; work-items beyond have nothing to do"),)
+)
+
+MESH = Group(
+    "MESH",
+    None,
+    (
+        _table("faces", "int", "three vertices of each face"),
+        _table("vertices", "float", "x, y and z of each"),
+    ),
+)
+
+BOXES = Group(
+    "BOXES", None, (Argument("boxes", "__global Box *", "around each face or object, with its number"),)
+)
+
+CHUNKS = Group("CHUNKS", None, (_table("chunks", "uint", "first box and number of boxes of each chunk"),))
+
+MEASURES = Group(
+    "MEASURES", None, (Argument("measures", "__global Box *", "around the boxes and the centres of a chunk"),)
+)
+
+BINS = Group(
+    "BINS",
+    None,
+    (
+        *(_number(f"origin_{axis}", f"where bins along {axis} begin") for axis in "xyz"),
+        *(_number(f"scale_{axis}", "how many of these bins a unit of length has") for axis in "xyz"),
+        Argument("bins", "__global Box *", "around the boxes in each bin: those of x, y and z of each chunk"),
+        Argument("bin_counts", "__global uint *", "how many boxes these are"),
+    ),
+)
+
+SIDES = Group(
+    "SIDES",
+    None,
+    (
+        _count("axis", "along which bins lie"),
+        _count("position", "the first bin of the upper side"),
+        _number("origin", "where bins begin"),
+        _number("scale", "how many bins a unit of length has"),
+        _table("sides", "uint", "where the boxes of each chunk go: of the lower side, of the upper one"),
+    ),
+)
+
+MOVED = Group("MOVED", None, (Argument("moved", "__global Box *", "boxes in their new places"),))
+
+LEVEL = Group(
+    "LEVEL",
+    None,
+    (
+        _count("leaf_size", "the most boxes of a leaf"),
+        Argument("level_nodes", "__global Node *", "the nodes of the level"),
+        Argument("children", "__global uint *", "first box and number of boxes of their children"),
+    ),
+)
+
+SPLITTING = Group(
+    "SPLITTING",
+    None,
+    (
+        _count(
+            "capacity", "ranges with more boxes are split evenly, so that the levels that are left suffice"
+        ),
+        _count("largest", "ranges with more boxes are left to the host"),
+        _table("ranges", "uint", "first box and number of boxes of each node"),
+        Argument("child_counts", "__global uint *", "inner children and leaves of each node"),
+    ),
+)
+
+LINKING = Group(
+    "LINKING",
+    None,
+    (
+        _count("next_node", "where the next level begins in the tree"),
+        _count("next_pack", "where the packs of this level begin in it"),
+        _table("before", "uint", "inner children and leaves of the nodes before each node"),
+        Argument("next_ranges", "__global uint *", "`ranges` of the next level"),
+    ),
+)
+
+LEAVES = Group(
+    "LEAVES", None, (Argument("leaf_packs", "__global TrianglePack *", "of a tree, or of one level"),)
+)
+
+REFITTING = Group(
+    "REFITTING",
+    None,
+    (
+        _count("first_node", "of those that are fitted"),
+        Argument("tree_nodes", "__global Node *", "all nodes of the tree"),
+    ),
+)
+
 GROUPS = (
     LAUNCH, SLOTS, LIST, GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE, PATH_STATE, COMPACTION, BLOCK_MEMORY,
     RADIANCE, FIRST_HITS, REDUCTION, RESOLUTION,
+    ITEMS, MESH, BOXES, CHUNKS, MEASURES, BINS, SIDES, MOVED, LEVEL, SPLITTING, LINKING, LEAVES, REFITTING,
 )  # fmt: skip
 """Every group."""
 
@@ -221,6 +327,15 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     "first_hits": (LAUNCH, SHADING, PATH_STATE, FIRST_HITS),
     "reduce": (LAUNCH, SLOTS, REDUCTION),
     "resolve": (RESOLUTION,),
+    "bound_faces": (ITEMS, MESH, BOXES),
+    "measure_chunks": (ITEMS, BOXES, CHUNKS, MEASURES),
+    "bin_chunks": (ITEMS, BOXES, CHUNKS, BINS),
+    "scatter_chunks": (ITEMS, BOXES, CHUNKS, SIDES, MOVED),
+    "copy_chunks": (ITEMS, BOXES, CHUNKS, MOVED),
+    "split_ranges": (ITEMS, BOXES, LEVEL, SPLITTING),
+    "link_children": (ITEMS, MESH, BOXES, LEVEL, LINKING, LEAVES),
+    "refit_packs": (ITEMS, MESH, LEAVES),
+    "refit_nodes": (ITEMS, MESH, LEAVES, REFITTING),
 }
 """The groups that each kernel takes, in order."""
 
@@ -239,7 +354,7 @@ def arguments(
 ) -> list[Any]:
     """What a kernel with these groups is launched with: by name from `values`, else from the scene.
 
-    Whole numbers become what the kernel takes. Raises KeyError where nothing has the name.
+    Numbers become what the kernel takes. Raises KeyError where nothing has the name.
     """
     return [_bound(argument, values, scene) for argument in parameters(groups)]
 
@@ -251,7 +366,8 @@ def _bound(argument: Argument, values: Mapping[str, Any], scene: SceneBuffers | 
         value = scene.cluster_count if argument.name == "cluster_count" else scene.buffer(argument.name)
     else:
         raise KeyError(f"nothing is bound to the kernel argument {argument.name!r}: {argument.holds}")
-    return np.uint32(value) if argument.c_type == "uint" else value
+    scalar = _SCALARS.get(argument.c_type)
+    return value if scalar is None else scalar(value)
 
 
 def c_header(groups: tuple[Group, ...] = GROUPS) -> str:

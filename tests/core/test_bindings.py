@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
+from importlib import resources
 from typing import Any
 
 import numpy as np
@@ -14,12 +16,29 @@ from incpt.core.bindings import BLOCK, KERNELS, Argument, Group
 from incpt.device import program
 from incpt.device.device import Device
 
+KERNEL = re.compile(r"__kernel\b[^{;]*?(\w+)\([A-Z]+_PARAMETERS")
+
+
+def files_of_kernels() -> dict[str, str]:
+    """The file of cl/ that each kernel is defined in."""
+    found: dict[str, str] = {}
+    for file, path in program.files().items():
+        text = (resources.files("incpt.cl") / f"{path}.cl").read_text()
+        names = KERNEL.findall(text)
+        assert len(names) == text.count("__kernel"), (
+            f"cl/{path}.cl: a kernel whose parameters are not declared"
+        )
+        found |= dict.fromkeys(names, file)
+    return found
+
+
+FILES = files_of_kernels()
 FEATURES = {"sample_lights": ("TRIANGLE_LIGHTS",), "trace_blocks": ("TRIANGLE_LIGHTS", "MEDIA", "AOVS")}
 
 
 def declared(device: Device, name: str) -> list[tuple[str, str]]:
     """Type and name of every argument of a kernel, as the compiler has read them."""
-    text = device.program_text(name, FEATURES.get(name, ()))
+    text = device.program_text(FILES[name], FEATURES.get(name, ()))
     options = [*program.BUILD_OPTIONS, "-cl-kernel-arg-info"]
     kernel = cl.Kernel(cl.Program(device.context, text).build(options=options), name)
     info = cl.kernel_arg_info
@@ -35,6 +54,10 @@ def bound(groups: tuple[Group, ...]) -> list[tuple[str, str]]:
         a.c_type.removeprefix("__global ").removeprefix("__local ").removeprefix("const ") for a in arguments
     ]
     return [(c_type.replace(" ", ""), a.name) for c_type, a in zip(plain, arguments, strict=True)]
+
+
+def test_every_kernel_is_declared() -> None:
+    assert FILES.keys() == KERNELS.keys()
 
 
 @pytest.mark.parametrize("name", sorted(KERNELS))
