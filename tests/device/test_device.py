@@ -175,14 +175,20 @@ def small(make: Callable[[], Scene]) -> Scene:
     return replace(scene, settings=replace(scene.settings, size=(53, 37), base_nor=8, roulette_depth=1))
 
 
-@pytest.mark.slow
 def half_clear_scene() -> Scene:
     """One of whose bodies is opaque for half of the paths that meet it."""
     return mixed_scene().with_material("glass", transmission=0.5)
 
 
+def frosted_scene() -> Scene:
+    """One with a rough transparent body, for which lights are sampled."""
+    return mixed_scene().with_material("glass", roughness=0.6)
+
+
 @pytest.mark.parametrize(
-    "make", [mixed_scene, half_clear_scene, cornell, glass, plates], ids=lambda make: make.__name__
+    "make",
+    [mixed_scene, half_clear_scene, frosted_scene, cornell, glass, plates],
+    ids=lambda make: make.__name__,
 )
 def test_blocks_and_wavefront_agree(make: Callable[[], Scene], device: Device) -> None:
     """The kernel that traces blocks of paths on CPUs, and the wavefront of all other devices."""
