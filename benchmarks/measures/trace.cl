@@ -5,12 +5,12 @@
 #ifdef BLOCKS
 
 // Puts a block of rays where the rays of paths stand, or where their shadow rays do.
-STAGE void load_rays(const Block *block, __local float *planes, uint path_class, uint first, uint size,
-                     uint count, __global const float *given) {
+STAGE void load_rays(const Block *block, __local float *planes, uint path_class, uint count,
+                     __global const float *given) {
     for (uint p = 0; p < RAY_PLANES; p++)
-        for (uint i = 0; i < size; i++)
-            planes[p * BLOCK_STRIDE + i] = given[p * count + first + i];
-    for (uint i = 0; i < size; i++) {
+        for (uint i = 0; i < block->size; i++)
+            planes[p * BLOCK_STRIDE + i] = given[p * count + block->first + i];
+    for (uint i = 0; i < block->size; i++) {
         store_class(&block->state, i, path_class);
         store_result(&block->state, i, i);
     }
@@ -18,31 +18,32 @@ STAGE void load_rays(const Block *block, __local float *planes, uint path_class,
 
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
 trace_closest(RAYS_PARAMETERS, BLOCK_PARAMETERS, DISTANCES_PARAMETERS) {
-    const Block block = BLOCK_OF(0, 0);
-    const uint first = (uint)get_group_id(0) * BLOCK_PATHS, size = MIN(count - first, BLOCK_PATHS);
-    load_rays(&block, block.state.rays, CLASS_LIVE, first, size, count, given);
-    trace_rays(&block, size, from_camera != 0);
-    for (uint i = 0; i < size; i++) {
+    const Block block = BLOCK_OF(0, 0, 0, count);
+    load_rays(&block, block.state.rays, CLASS_LIVE, count, given);
+    trace_nearest(&block, block.size, from_camera != 0);
+    for (uint i = 0; i < block.size; i++) {
         const RawHit hit = load_raw_hit(&block, i);
-        distances[first + load_result(&block.traced, i)] = hit.object == NO_INDEX ? INFINITY : hit.distance;
+        distances[block.first + load_result(&block.traced, i)] =
+            hit.object == NO_INDEX ? INFINITY : hit.distance;
     }
 }
 
 // 1 where something is nearer than the limit, else 0.
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void trace_any(RAYS_PARAMETERS, BLOCK_PARAMETERS,
                                                                             DISTANCES_PARAMETERS) {
-    const Block block = BLOCK_OF(0, 0);
-    const uint first = (uint)get_group_id(0) * BLOCK_PATHS, size = MIN(count - first, BLOCK_PATHS);
+    const Block block = BLOCK_OF(0, 0, 0, count);
     const State *state = &block.state;
-    load_rays(&block, state->shadows, CLASS_SHADOW, first, size, count, given);
-    for (uint i = 0; i < size; i++) {
-        state->shadows[SHADOW_DISTANCE * BLOCK_STRIDE + i] = limits[first + i];
+    load_rays(&block, state->shadows, CLASS_SHADOW, count, given);
+    for (uint i = 0; i < block.size; i++) {
+        state->shadows[SHADOW_DISTANCE * BLOCK_STRIDE + i] = limits[block.first + i];
         store_arriving(state, i, vec3(1.0f, 1.0f, 1.0f));
         store3(state->radiance, BLOCK_STRIDE, i, vec3(0.0f, 0.0f, 0.0f));
     }
-    trace_shadows(&block, size);
-    for (uint i = 0; i < size; i++)
-        distances[first + i] = 1.0f - state->radiance[i];
+    BlockRay ray;
+    ray.count = block.size;
+    trace_shadows(&block, &ray);
+    for (uint i = 0; i < block.size; i++)
+        distances[block.first + i] = 1.0f - state->radiance[i];
 }
 
 #else

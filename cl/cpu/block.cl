@@ -13,6 +13,8 @@
 typedef struct {
     const Params *params;
     __global const Slot *slots;
+    __global float *path_buffer;
+    uint first, size; // the place of its first path in the path buffer, and how many paths it has
     Geometry geometry;
     Shading shading;
     Emitters emitters;
@@ -26,10 +28,19 @@ typedef struct {
 #define PLANES(memory, region) ((memory) + ARENA_##region * BLOCK_STRIDE)
 #define UINT_PLANES(memory, region) ((__local uint *)PLANES(memory, region))
 
+// The place of the first path of a work-item's block, and how many of `path_count` paths it takes.
+INLINE uint block_first(void) { return (uint)get_group_id(0) * BLOCK_PATHS; }
+INLINE uint block_size(uint path_count) {
+    return block_first() < path_count ? MIN(path_count - block_first(), BLOCK_PATHS) : 0;
+}
+
 // The block of a kernel with BLOCK_PARAMETERS.
-#define BLOCK_OF(params, slots)                                                                              \
+#define BLOCK_OF(params, slots, path_buffer, path_count)                                                     \
     {params,                                                                                                 \
      slots,                                                                                                  \
+     path_buffer,                                                                                            \
+     block_first(),                                                                                          \
+     block_size(path_count),                                                                                 \
      {GEOMETRY_ARGUMENTS},                                                                                   \
      {SHADING_ARGUMENTS},                                                                                    \
      {EMITTERS_ARGUMENTS},                                                                                   \

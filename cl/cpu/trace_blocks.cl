@@ -1,7 +1,8 @@
 // The path tracer for CPUs under PoCL and Intel's runtime: one kernel, in which every work-item takes a block
 // of paths from the camera to their ends. The stages are those of the wavefront, as loops over the block, so
 // that its state never leaves the nearest caches, and no list goes by way of the host. Where a stage is
-// straight-line code, LLVM runs the loop in SIMD lanes.
+// straight-line code, LLVM runs the loop in SIMD lanes. In which order they follow each other, and when, is
+// declared for both in incpt/core/stages.py; the functions that it names stand here in that order.
 //
 // Paths move together twice for each ray, so that loops go over neighbours: before the ray those that are
 // still alive, to the planes in which they are traced; behind it those that have hit something, back to their
@@ -34,10 +35,23 @@
 #define LAST_CARRIED PATH_RESULT
 #endif
 
-// Starts the paths from place `first` of the path buffer on.
-STAGE void start_paths(const Block *block, uint first, uint count) {
+// One ray of all paths of a block. Loops take their bounds out of it beforehand, since what they write might
+// change it for all that the compiler knows.
+typedef struct {
+    uint number; // 0: it comes from the camera
+    // How many paths of the block, from its first place on, are looked at: all those of the ray before; from
+    // trace_rays on those that follow this one; from setup_surfaces on those that have hit something.
+    uint count;
+    // What it has led paths to: nothing, an opaque surface, or a boundary or the inside of a medium. Behind
+    // setup_surfaces those on surfaces stand in front, and those in media follow.
+    Subset misses, surfaces, media;
+} BlockRay;
+
+// Starts the paths of a block.
+STAGE void start_paths(const Block *block) {
+    const uint first = block->first, size = block->size;
     LANES
-    for (int i = 0; i < (int)count; i++) {
+    for (int i = 0; i < (int)size; i++) {
         generate_path(block->params, block->slots, &block->state, i, first + i);
         store_result(&block->state, i, i);
         store3(block->state.radiance, BLOCK_STRIDE, i, vec3(0.0f, 0.0f, 0.0f));
@@ -61,7 +75,7 @@ STAGE uint compact_live(const Block *block, uint count, Subset *kinds) {
 
 // Finds the nearest hits of the live ones of `count` paths; returns how many they are. They come to stand in
 // front. `from_camera` tells whether neighbours go much the same way.
-STAGE uint trace_rays(const Block *block, uint count, bool from_camera) {
+STAGE uint trace_nearest(const Block *block, uint count, bool from_camera) {
     Subset kinds[RAY_KINDS];
     const uint live = compact_live(block, count, kinds);
 #ifdef BRUTE_FORCE
@@ -82,17 +96,14 @@ STAGE uint trace_rays(const Block *block, uint count, bool from_camera) {
     return live;
 }
 
-// What rays have led paths to: nothing, an opaque surface, or a boundary or the inside of a medium.
-typedef struct {
-    Subset misses, surfaces, media;
-} RayEnds;
-
 #define KEY_MISS 0
 #define KEY_SURFACE 1
 #define KEY_MEDIUM 2
 
-STAGE void classify_hits(const Block *block, uint count, RayEnds *ends) {
+// Sorts paths by what their rays have met.
+STAGE void classify_hits(const Block *block, BlockRay *ray) {
     __local uint *keys = UINT_PLANES(block->memory, KEYS), *words = UINT_PLANES(block->memory, SUBSETS);
+    const uint count = ray->count;
     LANES
     for (int i = 0; i < (int)count; i++) {
         uint object = load_raw_hit(block, i).object;
@@ -105,55 +116,64 @@ STAGE void classify_hits(const Block *block, uint count, RayEnds *ends) {
         keys[i] = hit ? KEY_SURFACE : KEY_MISS;
 #endif
     }
-    ends->misses = subset_where(keys, KEY_MISS, count, words);
-    ends->surfaces = subset_where(keys, KEY_SURFACE, count, words + BLOCK_STRIDE);
+    ray->misses = subset_where(keys, KEY_MISS, count, words);
+    ray->surfaces = subset_where(keys, KEY_SURFACE, count, words + BLOCK_STRIDE);
 #ifdef MEDIA
-    ends->media = subset_where(keys, KEY_MEDIUM, count, words + 2 * BLOCK_STRIDE);
+    ray->media = subset_where(keys, KEY_MEDIUM, count, words + 2 * BLOCK_STRIDE);
 #endif
 }
 
-STAGE void shade_misses(const Block *block, const Subset *misses) {
+// The stage `intersect` up to what rays meet.
+INLINE void trace_rays(const Block *block, BlockRay *ray) {
+    ray->count = trace_nearest(block, ray->count, ray->number == 0);
+    classify_hits(block, ray);
+}
+
+STAGE void shade_misses(const Block *block, const BlockRay *ray) {
     __local uint *list = UINT_PLANES(block->memory, LIST);
-    list_subset(list, misses, 0);
+    const uint count = ray->misses.count;
+    list_subset(list, &ray->misses, 0);
     LANES
-    for (int i = 0; i < (int)misses->count; i++)
+    for (int i = 0; i < (int)count; i++)
         shade_miss_path(block->params, &block->shading, &block->emitters, &block->traced, list[i],
                         load_result(&block->traced, list[i]));
 }
 
 // Moves a plane of all paths that have hit something, those on opaque surfaces in front.
 INLINE void compact_hit_plane(const Block *block, __local float *to, __local const float *from,
-                              const RayEnds *ends) {
+                              const BlockRay *ray) {
 #ifdef MEDIA
     __local float *moved = PLANES(block->memory, MOVED);
-    compact_plane(moved, from, &ends->media);
+    compact_plane(moved, from, &ray->media);
 #endif
-    compact_plane(to, from, &ends->surfaces);
+    compact_plane(to, from, &ray->surfaces);
 #ifdef MEDIA
-    for (uint first = 0; first < ends->media.count; first += LANE_COUNT)
-        store_lanes(to + ends->surfaces.count + first, load_lanes(moved + first));
+    for (uint first = 0; first < ray->media.count; first += LANE_COUNT)
+        store_lanes(to + ray->surfaces.count + first, load_lanes(moved + first));
 #endif
 }
 
 // Moves the paths that have hit something back to their own planes; returns how many they are.
-STAGE uint compact_hits(const Block *block, const RayEnds *ends) {
+STAGE uint compact_hits(const Block *block, const BlockRay *ray) {
     const State *from = &block->traced, *to = &block->state;
     __local float *hits = PLANES(block->memory, RAW_HITS);
     for (uint p = RAY_DIRECTION_X; p <= RAY_DIRECTION_Z; p++)
-        compact_hit_plane(block, to->rays + p * BLOCK_STRIDE, from->rays + p * BLOCK_STRIDE, ends);
+        compact_hit_plane(block, to->rays + p * BLOCK_STRIDE, from->rays + p * BLOCK_STRIDE, ray);
     for (uint p = 0; p <= LAST_CARRIED; p++)
-        compact_hit_plane(block, to->paths + p * BLOCK_STRIDE, from->paths + p * BLOCK_STRIDE, ends);
+        compact_hit_plane(block, to->paths + p * BLOCK_STRIDE, from->paths + p * BLOCK_STRIDE, ray);
     for (uint p = 0; p < RAW_HIT_PLANES; p++)
-        compact_hit_plane(block, hits + p * BLOCK_STRIDE, hits + p * BLOCK_STRIDE, ends);
+        compact_hit_plane(block, hits + p * BLOCK_STRIDE, hits + p * BLOCK_STRIDE, ray);
 #ifdef MEDIA
-    return ends->surfaces.count + ends->media.count;
+    return ray->surfaces.count + ray->media.count;
 #else
-    return ends->surfaces.count;
+    return ray->surfaces.count;
 #endif
 }
 
-// A path's hit is read whole before its surface is written: the two share memory.
-STAGE void setup_surfaces(const Block *block, uint count) {
+// What of the stage `intersect` is left, for paths that have hit something. A path's hit is read whole before
+// its surface is written: the two share memory.
+STAGE void setup_surfaces(const Block *block, BlockRay *ray) {
+    const uint count = ray->count = compact_hits(block, ray);
     LANES
     for (int i = 0; i < (int)count; i++) {
         const RawHit hit = load_raw_hit(block, i);
@@ -162,28 +182,29 @@ STAGE void setup_surfaces(const Block *block, uint count) {
     }
 }
 
-#ifdef LIGHT_SAMPLING
-// Traces the shadow rays that paths ask for, and adds what they bring.
-STAGE void trace_shadows(const Block *block, uint count) {
-#ifdef BRUTE_FORCE
-    uint listed = brute_force_any(block, count);
-#else
-    Subset subset;
-    subsets_by_kind(block, &block->state, block->state.shadows, CLASS_SHADOW, count, &subset);
-    list_subset(UINT_PLANES(block->memory, LIST), &subset, 0);
-    uint listed = subset.count;
-#endif
-#ifndef BRUTE_FORCE_ONLY
-    interleaved_any(block, count, listed);
-#endif
+#ifdef AOVS
+// Fills the auxiliary planes of the path buffer; those that have hit something stand in front.
+STAGE void write_aovs(const Block *block, const BlockRay *ray) {
+    const uint first = block->first, size = block->size, count = ray->count;
+    const uint stride = block->params->buffer_stride;
+    __global float *path_buffer = block->path_buffer;
+    for (uint p = SAMPLE_ALBEDO_R; p < SAMPLE_PLANES; p++)
+        for (uint i = 0; i < size; i++)
+            path_buffer[p * stride + first + i] = 0.0f;
+    LANES
+    for (int i = 0; i < (int)count; i++)
+        write_aovs_path(&block->shading, &block->state, i, path_buffer, stride,
+                        first + load_result(&block->state, i));
 }
 #endif
 
 #ifdef MEDIA
-// Shades the paths from place `first` on, which have met a medium or are inside of one. Those that turn out
-// to stand on an opaque surface are shaded as such.
-STAGE void shade_media(const Block *block, uint first, uint count) {
+// Shades the paths that have met a medium or are inside of one. Those that turn out to stand on an opaque
+// surface are shaded as such. Lights are sampled for those that need it: at a smooth boundary none do, so
+// that paths on opaque surfaces get their sample when they are known.
+STAGE void shade_media(const Block *block, const BlockRay *ray) {
     const State *state = &block->state;
+    const uint first = ray->surfaces.count, count = ray->count;
 #if defined(LIGHT_SAMPLING) && !defined(SMOOTH_MEDIA)
     LANES
     for (int i = first; i < (int)count; i++)
@@ -199,9 +220,11 @@ STAGE void shade_media(const Block *block, uint first, uint count) {
     list_subset(list, &subset, first);
     const uint opaque = subset.count;
 #ifdef LIGHT_SAMPLING
+#ifdef SMOOTH_MEDIA
     LANES
     for (int i = 0; i < (int)opaque; i++)
         sample_lights_path(block->params, &block->emitters, state, list[i]);
+#endif
     LANES
     for (int i = 0; i < (int)opaque; i++)
         absorb_light(&block->shading, state, list[i]);
@@ -210,15 +233,11 @@ STAGE void shade_media(const Block *block, uint first, uint count) {
     for (int i = 0; i < (int)opaque; i++)
         shade_path(block->params, &block->shading, state, list[i], load_result(state, list[i]));
 }
-#else
-STAGE void finish_paths(const Block *block, uint count) {
-    LANES
-    for (int i = 0; i < (int)count; i++)
-        finish_path(&block->shading, &block->state, i, load_result(&block->state, i));
-}
 #endif
 
-STAGE void shade_surfaces(const Block *block, uint count) {
+// Shades the paths on opaque surfaces, with lights that are sampled here.
+STAGE void shade_surfaces(const Block *block, const BlockRay *ray) {
+    const uint count = ray->surfaces.count;
 #ifdef LIGHT_SAMPLING
     LANES
     for (int i = 0; i < (int)count; i++)
@@ -229,58 +248,49 @@ STAGE void shade_surfaces(const Block *block, uint count) {
         shade_path(block->params, &block->shading, &block->state, i, load_result(&block->state, i));
 }
 
-#ifdef AOVS
-// Fills the auxiliary planes of the path buffer for `size` paths from place `first` on, of which `count` have
-// hit something and stand in front.
-STAGE void write_aovs(const Block *block, __global float *path_buffer, uint first, uint size, uint count) {
-    const uint stride = block->params->buffer_stride;
-    for (uint p = SAMPLE_ALBEDO_R; p < SAMPLE_PLANES; p++)
-        for (uint i = 0; i < size; i++)
-            path_buffer[p * stride + first + i] = 0.0f;
+#ifndef MEDIA
+STAGE void finish_paths(const Block *block, BlockRay *ray) {
+    const uint count = ray->count;
     LANES
     for (int i = 0; i < (int)count; i++)
-        write_aovs_path(&block->shading, &block->state, i, path_buffer, stride,
-                        first + load_result(&block->state, i));
+        finish_path(&block->shading, &block->state, i, load_result(&block->state, i));
+    ray->count = 0;
 }
 #endif
 
-// Takes the paths of a block, from place `first` of the path buffer on, from their start to their end.
-INLINE void trace_block(const Block *block, __global float *path_buffer, uint first, uint size) {
-    uint count = size;
-    start_paths(block, first, count);
-    for (uint ray = 0; count > 0; ray++) {
-        count = trace_rays(block, count, ray == 0);
-        RayEnds ends;
-        classify_hits(block, count, &ends);
-        if (block->params->sees_sky)
-            shade_misses(block, &ends.misses);
-        count = compact_hits(block, &ends);
-        setup_surfaces(block, count);
-#ifdef AOVS
-        if (ray == 0)
-            write_aovs(block, path_buffer, first, size, count);
-#endif
-#ifdef MEDIA
-        shade_media(block, ends.surfaces.count, count);
-#else
-        if (ray == block->params->last_ray) {
-            finish_paths(block, count);
-            return;
-        }
-#endif
-        shade_surfaces(block, ends.surfaces.count);
 #ifdef LIGHT_SAMPLING
-        trace_shadows(block, count);
+// Traces the shadow rays that paths ask for, and adds what they bring.
+STAGE void trace_shadows(const Block *block, const BlockRay *ray) {
+    const uint count = ray->count;
+#ifdef BRUTE_FORCE
+    uint listed = brute_force_any(block, count);
+#else
+    Subset subset;
+    subsets_by_kind(block, &block->state, block->state.shadows, CLASS_SHADOW, count, &subset);
+    list_subset(UINT_PLANES(block->memory, LIST), &subset, 0);
+    uint listed = subset.count;
 #endif
+#ifndef BRUTE_FORCE_ONLY
+    interleaved_any(block, count, listed);
+#endif
+}
+#endif
+
+// Takes the paths of a block from their start to their end.
+INLINE void trace_block(const Block *block) {
+    start_paths(block);
+    BlockRay ray;
+    ray.count = block->size;
+    for (ray.number = 0; ray.count > 0; ray.number++) {
+        STAGES_OF_RAY(block, &ray)
     }
 }
 
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
 trace_blocks(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, BLOCK_PARAMETERS, RADIANCE_PARAMETERS) {
-    const Block block = BLOCK_OF(&params, slots);
-    const uint first = (uint)get_group_id(0) * BLOCK_PATHS;
-    const uint size = first < params.path_count ? MIN(params.path_count - first, BLOCK_PATHS) : 0;
-    trace_block(&block, path_buffer, first, size);
+    const Block block = BLOCK_OF(&params, slots, path_buffer, params.path_count);
+    const uint first = block.first, size = block.size;
+    trace_block(&block);
     for (uint c = 0; c < 3; c++)
         for (uint i = 0; i < size; i++)
             path_buffer[c * params.buffer_stride + first + i] = block.state.radiance[c * BLOCK_STRIDE + i];

@@ -1,7 +1,7 @@
 """Programs: from the files of cl/ to the text that a device's compiler gets.
 
-A program is one file of cl/ with its includes put in, behind the headers of `layout`, `bindings` and `arena`
-and the names of its *features*: preprocessor names that choose a variant of it.
+A program is one file of cl/ with its includes put in, behind the headers of `layout`, `bindings`, `arena` and
+`stages`, and the names of its *features*: preprocessor names that choose a variant of it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from functools import cache
 from importlib import resources
 from importlib.resources.abc import Traversable
 
-from incpt.core import arena, bindings, layout
+from incpt.core import arena, bindings, layout, stages
 
 # Relaxed arithmetic only where NaN and infinity keep their meaning: -cl-fast-relaxed-math loses rays.
 BUILD_OPTIONS = ("-cl-std=CL1.2", "-cl-mad-enable", "-cl-no-signed-zeros")
@@ -64,7 +64,9 @@ def program_text(
         if name.split()[0] not in FEATURES:
             raise KeyError(f"no kernel knows the feature {name}")
     defines = "".join(f"#define {name}\n" for name in features)
-    headers = layout.c_header() + bindings.c_header() + arena.c_header(block_paths)
+    headers = (
+        layout.c_header() + bindings.c_header() + arena.c_header(block_paths) + stages.c_header(features)
+    )
     return f"// target: {target}\n{defines}{headers}\n{source(file)}"
 
 

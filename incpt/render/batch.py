@@ -32,3 +32,8 @@ class Batch:
     path_count: int
     path_buffer: cl.Buffer
     aovs: bool = False
+
+    @property
+    def features(self) -> tuple[str, ...]:
+        """What chooses the variants of the kernels that trace these paths; see `program.FEATURES`."""
+        return (*self.tables.variant, *(("AOVS",) if self.aovs else ()))

@@ -35,8 +35,7 @@ class BlockTracer:
         tables = batch.tables
         params = launch_params(batch.params, tables)
         params["path_count"] = batch.path_count
-        features = (*tables.variant, *(("AOVS",) if batch.aovs else ()))
-        kernel = self.device.kernel("trace_blocks", features=features)
+        kernel = self.device.kernel("trace_blocks", features=batch.features)
         values = {"params": params, "slots": batch.slots, "path_buffer": batch.path_buffer}
         launch(self.device, kernel, bindings.KERNELS["trace_blocks"], batch.path_count, values, tables)
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core import layout
+from incpt.core import layout, stages
 from incpt.core.settings import RenderSettings
-from incpt.render.schedule import scheduled
 from incpt.tables.scene_tables import SceneTables
 
 
@@ -32,8 +31,10 @@ def path_params(
 
 def launch_params(params: npt.NDArray[np.void], tables: SceneTables) -> npt.NDArray[np.void]:
     """A copy of `params` with what kernels are told of the scene that the paths are traced in: lights,
-    environment, and which stages it may do without."""
-    params, environment = scheduled(params, tables), tables.scene.environment
+    environment, and what the stages of a ray depend on."""
+    params, environment = params.copy(), tables.scene.environment
+    params["last_ray"] = stages.last_ray(int(params["max_bounces"]), tables.has_media)
+    params["sees_sky"] = any(tables.environment_radiance)
     params["light_count"] = tables.light_count
     params["environment_probability"] = tables.environment_probability
     params["environment_color"] = tables.environment_radiance

@@ -2,11 +2,8 @@
 
 Instead of one kernel with the path loop, each stage of all paths runs as a kernel of its own, over lists
 of the paths that need it: a terminated path costs nothing more, and on PoCL the straight-line stages run
-in SIMD lanes. Paths are traced in chunks whose state fits the caches of a CPU.
-
-    generate -> [ intersect -> shade_miss, sample_lights, shade_medium, shade -> trace_shadow ] once a ray
-
-Where auxiliary images are asked for, `write_aovs` follows the first `intersect`.
+in SIMD lanes. Paths are traced in chunks whose state fits the caches of a CPU. `generate` starts them; then
+every ray goes through the stages of core/stages.py.
 
 The lengths of the lists stay on the device. The host launches each stage over a bound of its list, and learns
 how many paths are left of a ray while the device is at work on a later one; work-items beyond the list have
@@ -16,9 +13,9 @@ nothing to do.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -27,10 +24,10 @@ import pyopencl as cl
 
 from incpt.core import bindings, layout
 from incpt.core.layout import PathClass, PathList
+from incpt.core.stages import Stage, When, holding, stages_of
 from incpt.device.device import BUILD_SIZES, Device
 from incpt.render.batch import Batch
 from incpt.render.params import launch_params
-from incpt.tables.scene_tables import SceneTables
 
 _RAYS_AHEAD = 2
 """Rays whose stages are enqueued before the host needs to know how many paths the first of them has left."""
@@ -41,28 +38,38 @@ _PLANES = {
     "surfaces": layout.SurfacePlane,
     "shadows": layout.ShadowPlane,
 }
-_CLASSES = {
-    PathList.LIVE: PathClass.LIVE,
-    PathList.SURFACE: PathClass.SURFACE,
-    PathList.MISS: PathClass.MISS,
-    PathList.MEDIUM: PathClass.MEDIUM,
-    PathList.SHADOW: PathClass.SHADOW,
-}
+_CLASSES = {path_list: PathClass[path_list.name] for path_list in PathList}
 """Which paths are in which list."""
+_LIGHTS = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS")
+_FEATURES: Mapping[str | None, tuple[str, ...]] = {
+    "shade_miss": (*_LIGHTS, "MEDIA"),
+    "sample_lights": _LIGHTS,
+    "shade_medium": _LIGHTS,
+    "shade": _LIGHTS,
+}
+"""The features of a scene without which a kernel would leave something out. Those that would only make it
+quicker, as they do blocks, would be more variants to build."""
 _NEW_LISTS = 3
 """Lists that `compact` appends to at a time."""
 
 
+@dataclass(frozen=True)
+class _StageLaunch:
+    """A stage of a ray, with its kernel and the features that choose a variant of it."""
+
+    stage: Stage
+    kernel: str
+    features: tuple[str, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class _Chunk:
-    """Paths of a batch whose state is on the device at the same time; `params` are their launches'."""
+    """Paths of a batch whose state is on the device at the same time, with the parameters of their launches
+    and what is launched on each of their rays."""
 
     batch: Batch
     params: npt.NDArray[np.void]
-
-    @property
-    def tables(self) -> SceneTables:
-        return self.batch.tables
+    launches: tuple[_StageLaunch, ...]
 
     @property
     def size(self) -> int:
@@ -97,25 +104,21 @@ class Wavefront:
         """See `tracer.Tracer`."""
         for chunk in self._chunks(batch):
             self._generate(chunk)
-            self._intersect(chunk, 0, chunk.size)
+            self._launch_listed("intersect", chunk, 0, chunk.size, PathList.LIVE)
             self._first_hits(chunk, surface, object_ids)
 
     def idle_launches(self, batch: Batch) -> list[Callable[[], None]]:
         """See `tracer.Tracer`."""
         chunk = self._chunk(batch, 0, 0)
-        stages: list[Callable[[], object]] = [
-            partial(self._sample_lights, chunk, 0, 0, PathList.SURFACE),
-            partial(self._shade, chunk, 0, 0),
-            partial(self._trace_shadows, chunk, 0, 0),
-            partial(self._shade_misses, chunk, 0, 0),
+        kernels = dict.fromkeys((one.kernel, one.features) for one in chunk.launches)
+        del kernels["intersect", ()]  # first hits need it too
+        return [
+            *self.idle_first_hits(batch),
+            *self._idle(
+                partial(self._launch_listed, kernel, chunk, 0, 0, PathList.LIVE, features)
+                for kernel, features in kernels
+            ),
         ]
-        if chunk.tables.has_media:
-            stages.append(partial(self._shade_media, chunk, 0, 0))
-        else:
-            stages.append(partial(self._shade, chunk, 0, 0, last=True))
-        if batch.aovs:
-            stages.append(partial(self._write_aovs, chunk, 0))
-        return [*self.idle_first_hits(batch), *self._idle(stages)]
 
     def idle_first_hits(self, batch: Batch) -> list[Callable[[], None]]:
         """As `idle_launches`, of the kernels that `first_hits` needs alone."""
@@ -123,19 +126,19 @@ class Wavefront:
         return self._idle(
             [
                 partial(self._generate, chunk),
-                partial(self._intersect, chunk, 0, 0),
+                partial(self._launch_listed, "intersect", chunk, 0, 0, PathList.LIVE),
                 partial(self._first_hits, chunk, nothing, nothing),
             ]
         )
 
-    def _idle(self, stages: list[Callable[[], object]]) -> list[Callable[[], None]]:
-        return [partial(self._launch_idle, stage, size) for stage in stages for size in BUILD_SIZES]
+    def _idle(self, launches: Iterable[Callable[[], None]]) -> list[Callable[[], None]]:
+        return [partial(self._launch_idle, launch, size) for launch in launches for size in BUILD_SIZES]
 
-    def _launch_idle(self, stage: Callable[[], object], size: int) -> None:
+    def _launch_idle(self, launch: Callable[[], None], size: int) -> None:
         self._least_size = size
         self.device.fill(self._lengths, 0, self._lengths.size)
         try:
-            stage()
+            launch()
         finally:
             self._least_size = 1
 
@@ -148,7 +151,7 @@ class Wavefront:
     def _chunk(self, batch: Batch, first: int, size: int) -> _Chunk:
         params = launch_params(batch.params, batch.tables)
         params["first_path"], params["path_count"], params["path_stride"] = first, size, self.stride
-        return _Chunk(batch, params)
+        return _Chunk(batch, params, _launches_of(batch.features))
 
     def _trace_chunk(self, chunk: _Chunk) -> None:
         self._generate(chunk)
@@ -168,57 +171,19 @@ class Wavefront:
 
     def _trace_ray(self, chunk: _Chunk, ray: int, bound: int) -> None:
         """Ray number `ray` of every live path, which are `bound` at most."""
-        last = ray == int(chunk.params["last_ray"])
-        self._intersect(chunk, ray, bound)
-        if chunk.batch.aovs and ray == 0:
-            self._write_aovs(chunk, bound)
-        listed = [(path_list, ray) for path_list in (PathList.SURFACE, PathList.MISS, PathList.MEDIUM)]
-        self._compact(chunk, ray, bound, PathList.LIVE, *listed)
-        if chunk.params["sees_sky"]:
-            self._shade_misses(chunk, ray, bound)
-        if not last:
-            self._sample_lights(chunk, ray, bound, PathList.SURFACE)
-        if chunk.tables.has_media:
-            self._sample_lights(chunk, ray, bound, PathList.MEDIUM)
-            self._shade_media(chunk, ray, bound)
-        self._shade(chunk, ray, bound, last)
-        if not last:
-            self._compact(chunk, ray, bound, PathList.LIVE, (PathList.SHADOW, ray), (PathList.LIVE, ray + 1))
-            self._trace_shadows(chunk, ray, bound)
+        holds = holding(ray, int(chunk.params["last_ray"]), bool(chunk.params["sees_sky"]))
+        for one in chunk.launches:
+            stage = one.stage
+            if stage.when in holds:
+                self._launch_listed(one.kernel, chunk, ray, bound, stage.paths, one.features)
+                if stage.sorts:
+                    self._compact(chunk, ray, bound, stage.paths, stage.sorts)
 
     def _generate(self, chunk: _Chunk) -> None:
         """Start the paths of a chunk, and list those that lie in the image."""
         self._launch("generate", chunk, chunk.size, slots=chunk.batch.slots)
         self.device.fill(self._lengths, 0, self._lengths.size)
-        self._compact(chunk, 0, chunk.size, None, (PathList.LIVE, 0))
-
-    def _intersect(self, chunk: _Chunk, ray: int, bound: int) -> None:
-        self._launch_listed("intersect", chunk, ray, bound, PathList.LIVE)
-
-    def _write_aovs(self, chunk: _Chunk, bound: int) -> None:
-        self._launch_listed("write_aovs", chunk, 0, bound, PathList.LIVE)
-
-    def _shade_misses(self, chunk: _Chunk, ray: int, bound: int) -> None:
-        features = (*chunk.tables.features, *(("MEDIA",) if chunk.tables.has_media else ()))
-        self._launch_listed("shade_miss", chunk, ray, bound, PathList.MISS, features)
-
-    def _shade(self, chunk: _Chunk, ray: int, bound: int, last: bool = False) -> None:
-        features = ("EMISSION_ONLY",) if last else chunk.tables.features
-        self._launch_listed("shade", chunk, ray, bound, PathList.SURFACE, features)
-
-    def _trace_shadows(self, chunk: _Chunk, ray: int, bound: int) -> None:
-        if chunk.tables.features:
-            self._launch_listed("trace_shadow", chunk, ray, bound, PathList.SHADOW)
-
-    def _sample_lights(self, chunk: _Chunk, ray: int, bound: int, paths: PathList) -> None:
-        if chunk.tables.features:
-            self._launch_listed("sample_lights", chunk, ray, bound, paths, chunk.tables.features)
-
-    def _shade_media(self, chunk: _Chunk, ray: int, bound: int) -> None:
-        """Shade the paths at or in transparent bodies. Those that stand on an opaque surface in there join
-        the others."""
-        self._launch_listed("shade_medium", chunk, ray, bound, PathList.MEDIUM, chunk.tables.features)
-        self._compact(chunk, ray, bound, PathList.MEDIUM, (PathList.SURFACE, ray))
+        self._compact(chunk, 0, chunk.size, None, (PathList.LIVE,))
 
     def _first_hits(self, chunk: _Chunk, surface: cl.Buffer, object_ids: cl.Buffer) -> None:
         pixels = int(chunk.params["width"]) * int(chunk.params["height"])
@@ -227,13 +192,14 @@ class Wavefront:
         )
 
     def _compact(
-        self, chunk: _Chunk, ray: int, bound: int, source: PathList | None, *targets: tuple[PathList, int]
+        self, chunk: _Chunk, ray: int, bound: int, source: PathList | None, targets: tuple[PathList, ...]
     ) -> None:
-        """Append the paths of `source` (None: all) to up to three lists, each of a ray, by their classes."""
-        unused = targets[0]
+        """Append the paths of `source` to up to three lists, by their classes. None are all paths, that is to
+        say those that were just started, whose first ray is this one and not the next."""
         values: dict[str, Any] = {"takes_all": source is None}
         for i in range(_NEW_LISTS):
-            path_list, of_ray = targets[i] if i < len(targets) else unused
+            path_list = targets[i] if i < len(targets) else targets[0]
+            of_ray = ray + 1 if path_list == PathList.LIVE and source is not None else ray
             values |= {
                 f"class_{i}": _CLASSES[path_list] if i < len(targets) else PathClass(0),
                 f"list_{i}": self._list(path_list, of_ray),
@@ -266,9 +232,26 @@ class Wavefront:
         """Launch a kernel; its arguments are `values` by name, the planes of paths, and the buffers of the
         scene."""
         known = {**self._planes, "params": chunk.params, "radiance": chunk.batch.path_buffer, **values}
-        arguments = bindings.arguments(bindings.KERNELS[name], known, chunk.tables)
+        arguments = bindings.arguments(bindings.KERNELS[name], known, chunk.batch.tables)
         kernel = self.device.kernel(name, features=features)
         self.device.launch(kernel, max(size, self._least_size), *arguments)
+
+
+@cache
+def _launches_of(features: tuple[str, ...]) -> tuple[_StageLaunch, ...]:
+    """The kernels of a ray in order, for paths that are traced with these features."""
+    return tuple(
+        _StageLaunch(stage, stage.kernel, _features_of(stage, features))
+        for stage in stages_of(features)
+        if stage.kernel is not None
+    )
+
+
+def _features_of(stage: Stage, features: tuple[str, ...]) -> tuple[str, ...]:
+    """Those that choose the variant of the stage's kernel."""
+    if When.ENDS in stage.when:
+        return ("EMISSION_ONLY",)
+    return tuple(name for name in features if name in _FEATURES.get(stage.kernel, ()))
 
 
 def _length_place(path_list: PathList, ray: int) -> int:

@@ -307,22 +307,22 @@ def test_faces_without_area_are_left_out(device: Device) -> None:
 _KERNEL = """
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
 surfaces_of_rays(const uint count, __global const float *given, BLOCK_PARAMETERS, __global float *planes) {
-    const Block block = BLOCK_OF(0, 0);
-    const uint first = (uint)get_group_id(0) * BLOCK_PATHS, size = MIN(count - first, BLOCK_PATHS);
-    for (uint i = 0; i < size; i++) {
+    const Block block = BLOCK_OF(0, 0, 0, count);
+    for (uint i = 0; i < block.size; i++) {
         for (uint p = 0; p < RAY_PLANES; p++)
-            block.state.rays[p * BLOCK_STRIDE + i] = given[p * count + first + i];
+            block.state.rays[p * BLOCK_STRIDE + i] = given[p * count + block.first + i];
         store_class(&block.state, i, CLASS_LIVE);
         store_result(&block.state, i, i);
-        ((__global uint *)planes)[SURFACE_OBJECT * count + first + i] = NO_INDEX;
+        ((__global uint *)planes)[SURFACE_OBJECT * count + block.first + i] = NO_INDEX;
     }
-    RayEnds ends;
-    classify_hits(&block, trace_rays(&block, size, true), &ends);
-    const uint hit_count = compact_hits(&block, &ends);
-    setup_surfaces(&block, hit_count);
+    BlockRay ray;
+    ray.number = 0;
+    ray.count = block.size;
+    trace_rays(&block, &ray);
+    setup_surfaces(&block, &ray);
     for (uint p = 0; p < SURFACE_PLANES; p++)
-        for (uint i = 0; i < hit_count; i++)
-            planes[p * count + first + load_result(&block.state, i)] =
+        for (uint i = 0; i < ray.count; i++)
+            planes[p * count + block.first + load_result(&block.state, i)] =
                 block.state.surfaces[p * BLOCK_STRIDE + i];
 }
 """
