@@ -27,7 +27,7 @@ __kernel void reduce(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, REDUCTION_PARAMETERS) 
     __global const Slot *slot = &slots[groups[group]];
     uint in_tile = (uint)get_global_id(0) % tile_pixels;
     TilePixel at = {in_tile % params.tile_size, in_tile / params.tile_size};
-    uint x = slot->tile_x + at.x, y = slot->tile_y + at.y;
+    uint x = slot->tile_x + at.x * slot->pixel_step, y = slot->tile_y + at.y * slot->pixel_step;
     if (x >= params.width || y >= params.height)
         return;
 

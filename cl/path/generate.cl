@@ -14,7 +14,7 @@ INLINE void generate_path(const Params *params, __global const Slot *slots, cons
     uint pixel_place = quotient(group_place, group_count);
     uint sample = slot->first_sample + (group_place - pixel_place * group_count);
     TilePixel at = tile_pixel(params, pixel_place);
-    uint x = slot->tile_x + at.x, y = slot->tile_y + at.y;
+    uint x = slot->tile_x + at.x * slot->pixel_step, y = slot->tile_y + at.y * slot->pixel_step;
     int inside_image = (x < params->width) & (y < params->height);
 
     uint pixel = y * params->width + x;

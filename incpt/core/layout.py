@@ -233,11 +233,13 @@ class PathList(IntEnum):
 
 
 class SlotFlag(IntFlag):
-    """What `reduce` does with the slots of a tile: see `film.py`."""
+    """What becomes of the slots of a tile. FIRST, LAST and REPLACE: see `film.py`. SINGLE: paths have no
+    partner in the scene before the edit, even where they met something that changed."""
 
     FIRST = 1
     LAST = 2
     REPLACE = 4
+    SINGLE = 8
 
 
 class MaterialFlag(IntFlag):
@@ -396,6 +398,7 @@ SLOT = _packed(
         # group go pixel by pixel with the repetitions innermost, because equal pixels make coherent rays.
         ("tile_x", np.uint32),  # first pixel of the tile
         ("tile_y", np.uint32),
+        ("pixel_step", np.uint32),  # from a pixel to the next one; above 1 the slot has gaps
         ("first_sample", np.uint32),  # sample index of the first slot of the group
         ("group_first", np.uint32),  # its first slot
         ("group_count", np.uint32),

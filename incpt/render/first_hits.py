@@ -90,7 +90,7 @@ def object_at(
 def one_slot() -> npt.NDArray[np.void]:
     """(1,) layout.SLOT: a single path for each pixel of the tile at the top left."""
     slot = np.zeros(1, layout.SLOT)
-    slot["group_count"] = 1
+    slot["group_count"] = slot["pixel_step"] = 1
     return slot
 
 

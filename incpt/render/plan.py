@@ -104,6 +104,7 @@ def plan_step(
 
     groups = np.zeros(len(tiles), layout.SLOT)
     groups["tile_x"], groups["tile_y"] = grid.origin(tiles)
+    groups["pixel_step"] = 1
     groups["first_sample"] = first_sample if queue.replaces else first_sample + sample_counts[tiles]
     groups["group_first"] = group_begin - begin
     groups["group_count"] = group_end - group_begin

@@ -209,7 +209,7 @@ def test_plan_worked_by_hand() -> None:
     assert second.slots["flags"].tolist() == [6] * 3 + [5] * 4
     assert (second.finished.tolist(), second.cursor) == ([0], Cursor(2, 4))
     third = plan_step(grid, queue, second.cursor, 7, counts)
-    assert third.slots.tolist() == [(20, 0, 4, 0, 1, 6)]
+    assert third.slots.tolist() == [(20, 0, 1, 4, 0, 1, 6)]
     assert (third.finished.tolist(), is_done(queue, third.cursor)) == ([2], True)
 
 
