@@ -9,6 +9,7 @@ one that is under way waits in `pending`, so that nobody sees half of it.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
@@ -57,6 +58,14 @@ class FilmPass:
     resolution: Resolution = Resolution.MEAN
 
 
+@dataclass(frozen=True)
+class FilmPlanes:
+    """What a strategy keeps of each pixel by itself: so many planes of floats, 0 at first."""
+
+    name: str
+    count: int
+
+
 RADIANCE = FilmPass("radiance", 3)
 """Red, green and blue, as `Session.image` shows them."""
 ALBEDO = FilmPass("albedo", 3)
@@ -90,7 +99,12 @@ class Film:
     """
 
     def __init__(
-        self, device: Device, width: int, height: int, passes: tuple[FilmPass, ...] = (RADIANCE,)
+        self,
+        device: Device,
+        width: int,
+        height: int,
+        passes: tuple[FilmPass, ...] = (RADIANCE,),
+        planes: tuple[FilmPlanes, ...] = (),
     ) -> None:
         self.device, self.width, self.height, self.passes = device, width, height, passes
         self._nonfinite = device.empty(4)
@@ -101,11 +115,43 @@ class Film:
             for one, first in zip(passes, first_planes, strict=False)
         }
         assert len(self._layers) == len(passes), "passes of a film need different names"
+        self._planes = {one: self._zeroed(one) for one in planes}
 
-    def reduce(self, params: npt.NDArray[np.void], plan: Plan, slots: cl.Buffer, samples: cl.Buffer) -> None:
-        """Put the paths of a step into the film: `samples` holds what they brought, in the order of `slots`,
-        a plane of params["buffer_stride"] floats for each channel of each pass."""
-        groups = np.unique(plan.slots["group_first"]).astype(np.uint32)
+    def with_planes(self, planes: tuple[FilmPlanes, ...]) -> Film:
+        """The same film, with these planes of a strategy and none of another one."""
+        if set(planes) == set(self._planes):
+            return self
+        film = copy(self)
+        film._planes = {one: self._planes.get(one) or self._zeroed(one) for one in planes}
+        return film
+
+    def planes(self, planes: FilmPlanes) -> cl.Buffer:
+        """Planes that the film keeps, of width x height floats each."""
+        return self._planes[planes]
+
+    def clear(self, planes: FilmPlanes) -> None:
+        """Make the planes 0."""
+        self.device.fill(self._planes[planes], 0, self._size(planes))
+
+    def radiance_sums(self) -> cl.Buffer:
+        """The sums of red, green and blue, and the number of samples: four planes."""
+        return self._layers[RADIANCE.name].sums
+
+    def reduce(
+        self,
+        params: npt.NDArray[np.void],
+        plan: Plan,
+        slots: cl.Buffer,
+        samples: cl.Buffer,
+        passes: tuple[FilmPass, ...] | None = None,
+    ) -> None:
+        """Put the paths of a step into `passes` of the film (None: all): `samples` holds what they brought, in
+        the order of `slots`, a plane of params["buffer_stride"] floats for each channel of each pass. Slots
+        with gaps are left out, because no pass counts the pixels of a tile apart."""
+        whole_tiles = plan.slots[plan.slots["pixel_step"] == 1]
+        groups = np.unique(whole_tiles["group_first"]).astype(np.uint32)
+        if len(groups) == 0:
+            return
         size = len(groups) * int(params["tile_size"]) ** 2
         values = {
             "params": params,
@@ -115,8 +161,8 @@ class Film:
             "samples": samples,
             "nonfinite": self._nonfinite,
         }
-        for layer in self._layers.values():
-            layer.reduce(size, **values)
+        for one in self.passes if passes is None else passes:
+            self._layers[one.name].reduce(size, **values)
 
     def first_plane(self, name: str) -> int:
         """Where the planes of a pass begin in the path buffer."""
@@ -149,11 +195,15 @@ class Film:
         return self.device.read(layer.image, image)
 
     def sums(self) -> dict[str, Float32Array]:
-        """(channels + 1, height, width) of each pass: the sums of its channels, and the number of samples."""
+        """(channels + 1, height, width) of each pass: the sums of its channels, and the number of samples; and
+        the planes that are kept beside them."""
         found = {}
         for name, layer in self._layers.items():
             planes = np.empty((layer.film_pass.channels + 1, self.height, self.width), np.float32)
             found[name] = self.device.read(layer.sums, planes)
+        for kept, buffer in self._planes.items():
+            planes = np.empty((kept.count, self.height, self.width), np.float32)
+            found[kept.name] = self.device.read(buffer, planes)
         return found
 
     def restore(self, sums: Mapping[str, Float32Array]) -> None:
@@ -161,6 +211,17 @@ class Film:
         stays as it is."""
         for name in sums.keys() & self._layers.keys():
             self.device.write(self._layers[name].sums, sums[name])
+        for planes, buffer in self._planes.items():
+            if planes.name in sums:
+                self.device.write(buffer, sums[planes.name])
+
+    def _zeroed(self, planes: FilmPlanes) -> cl.Buffer:
+        buffer = self.device.empty(self._size(planes))
+        self.device.fill(buffer, 0, self._size(planes))
+        return buffer
+
+    def _size(self, planes: FilmPlanes) -> int:
+        return 4 * planes.count * self.width * self.height
 
 
 class _Layer:

@@ -21,6 +21,8 @@ from incpt.core import layout
 from incpt.render.tiles import IntArray, TileGrid
 
 CountArray = npt.NDArray[np.int64]
+SPARSE_STEP = 4
+"""Pixels from one to the next of a sparse entry, and tiles that it reaches over, in x and y."""
 
 
 @dataclass(frozen=True)
@@ -35,18 +37,30 @@ class Cursor:
 class Queue:
     """Tiles in the order in which they are rendered. Nobody can write to the arrays any more.
 
-    tiles     (N,) the order; each tile at most once.
+    tiles     (N,) the order; each tile at most once, but for sparse entries.
     samples   (N,) paths per pixel of each of them, one at least. Each path per pixel fills a slot.
     replaces  whether a finished tile replaces what the film has of it, with samples counted from 0 (BASE,
               INCREMENTAL), or is added to it and counts on from there (REFINE).
+    subsets   (N,) None: all entries are whole tiles, as those with -1 are. An entry with a number from 0 to 15
+              is sparse: of each square of 4 x 4 pixels it takes the one with that number, row by row, over the
+              4 x 4 tiles from its tile on. It has one sample, with the index before the first one of tiles.
+    singles   (N,) whether the paths of an entry have no partners in the scene before the edit; None: no
+              entry's have.
+    worth     (grid.count,) samples of the scene as it is now that each tile is worth, where that is not how
+              many were drawn; None: it is.
     """
 
     tiles: IntArray
     samples: CountArray
     replaces: bool
+    subsets: npt.NDArray[np.int8] | None = None
+    singles: npt.NDArray[np.bool_] | None = None
+    worth: CountArray | None = None
 
     def __post_init__(self) -> None:
-        self.tiles.flags.writeable = self.samples.flags.writeable = False
+        for array in (self.tiles, self.samples, self.subsets, self.singles, self.worth):
+            if array is not None:
+                array.flags.writeable = False
 
     @classmethod
     def even(cls, tiles: IntArray, samples: int, replaces: bool) -> Queue:
@@ -72,7 +86,7 @@ class Queue:
 class Plan:
     """One step: `slots` (layout.SLOT) says which tile and sample is in which slot, `finished` which tiles
     are complete after it, in queue order, and `finished_samples` how many samples each of them got; `cursor`
-    is where the next step goes on."""
+    is where the next step goes on. Sparse entries finish no tile."""
 
     slots: npt.NDArray[np.void]
     finished: IntArray
@@ -81,14 +95,20 @@ class Plan:
 
 
 def plan_step(
-    grid: TileGrid, queue: Queue, cursor: Cursor, slot_count: int, sample_counts: npt.NDArray[np.integer]
+    grid: TileGrid,
+    queue: Queue,
+    cursor: Cursor,
+    slot_count: int,
+    sample_counts: npt.NDArray[np.integer],
+    first_sample: int = 0,
 ) -> Plan:
     """Fill up to `slot_count` slots from where `cursor` stands in `queue`, but not past its end.
 
-    `sample_counts` (grid.count,) is what the film holds of each tile; it must not change while a tile is
-    under way. The repetitions of a tile in this step form a group of neighbouring slots with consecutive
-    sample indices. Where a tile has more samples than there are slots, its groups follow in the next steps:
-    FIRST marks the group that starts the tile, LAST the one that completes it.
+    `sample_counts` (grid.count,) is how many samples were drawn of each tile; it must not change while a tile
+    is under way. The first of them had the index `first_sample`. The repetitions of a tile in this step
+    form a group of neighbouring slots with consecutive sample indices. Where a tile has more samples than there are
+    slots, its groups follow in the next steps: FIRST marks the group that starts the tile, LAST the one that
+    completes it.
     """
     begin = queue.slots_before(cursor)
     end = min(begin + slot_count, queue.slot_count)
@@ -99,26 +119,45 @@ def plan_step(
     tiles, tile_end = queue.tiles[place], queue.ends[place]
     tile_begin = tile_end - queue.samples[place]
     group_begin, group_end = np.maximum(tile_begin, begin), np.minimum(tile_end, end)
-    first_sample = group_begin - tile_begin
+    sample_of_tile = group_begin - tile_begin
     completes = group_end == tile_end
 
     groups = np.zeros(len(tiles), layout.SLOT)
     groups["tile_x"], groups["tile_y"] = grid.origin(tiles)
     groups["pixel_step"] = 1
-    groups["first_sample"] = first_sample if queue.replaces else first_sample + sample_counts[tiles]
+    groups["first_sample"] = first_sample + sample_of_tile
+    if not queue.replaces:
+        groups["first_sample"] += sample_counts[tiles].astype(np.uint32)
     groups["group_first"] = group_begin - begin
     groups["group_count"] = group_end - group_begin
     groups["flags"] = (
-        (first_sample == 0) * int(layout.SlotFlag.FIRST)
+        (sample_of_tile == 0) * int(layout.SlotFlag.FIRST)
         + completes * int(layout.SlotFlag.LAST)
         + queue.replaces * int(layout.SlotFlag.REPLACE)
     )
+    if queue.singles is not None:
+        groups["flags"] += queue.singles[place] * np.uint32(layout.SlotFlag.SINGLE)
+    finishes = completes
+    if queue.subsets is not None:
+        subset = queue.subsets[place]
+        _thin_out(groups, subset, first_sample)
+        finishes = completes & (subset < 0)
     return Plan(
         slots=np.repeat(groups, groups["group_count"]),
-        finished=tiles[completes],
-        finished_samples=queue.samples[place][completes],
+        finished=tiles[finishes],
+        finished_samples=queue.samples[place][finishes],
         cursor=Cursor(last + 1) if completes[-1] else Cursor(last, end - int(tile_begin[-1])),
     )
+
+
+def _thin_out(groups: npt.NDArray[np.void], subset: npt.NDArray[np.int8], first_sample: int) -> None:
+    """Let the groups with a subset take one pixel of each square of 4 x 4."""
+    sparse = subset >= 0
+    assert not sparse.any() or first_sample > 0, "the sample of sparse entries has the index before the first"
+    groups["pixel_step"][sparse] = SPARSE_STEP
+    groups["first_sample"][sparse] = first_sample - 1
+    groups["tile_x"][sparse] += subset[sparse].astype(np.uint32) % SPARSE_STEP
+    groups["tile_y"][sparse] += subset[sparse].astype(np.uint32) // SPARSE_STEP
 
 
 def counts_after(queue: Queue, plan: Plan, counts: CountArray) -> CountArray:
