@@ -19,7 +19,7 @@
 // planes of sums, and one of the number of samples. A tile whose repetitions take several steps is kept in
 // `pending` until its last one, so that the film shows finished tiles only. A sample with a float that is not
 // finite counts as zero, and `nonfinite` counts it.
-__kernel void reduce(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, REDUCTION_PARAMETERS) {
+__kernel void reduce(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, TRACED_PARAMETERS, REDUCTION_PARAMETERS) {
     uint tile_pixels = params.tile_size * params.tile_size;
     uint group = (uint)get_global_id(0) / tile_pixels;
     if (group >= group_total)

@@ -182,17 +182,24 @@ FIRST_HITS = Group(
     ),
 )
 
-REDUCTION = Group(
-    "REDUCTION",
+TRACED = Group(
+    "TRACED",
     None,
     (
         _count("group_total", "how many groups of slots there are"),
         _table("groups", "uint", "the first slot of each group"),
         _table("samples", "float", "the path buffer: a plane for each channel of each pass"),
-        _count("first_plane", "where the pass begins in it"),
+        Argument("nonfinite", "__global uint *", "counts samples with a float that is not finite"),
+    ),
+)
+
+REDUCTION = Group(
+    "REDUCTION",
+    None,
+    (
+        _count("first_plane", "where the pass begins in the path buffer"),
         _planes("pending", "sums of tiles under way: CHANNELS planes and the number of samples"),
         _planes("film", "sums of finished tiles, as `pending`"),
-        Argument("nonfinite", "__global uint *", "counts samples with a float that is not finite"),
     ),
 )
 
@@ -204,6 +211,97 @@ RESOLUTION = Group(
         _table("sums", "float", "what `reduce` leaves in `film`"),
         _planes("image", "interleaved: the channels of the pass, and 1 where there is a sample"),
     ),
+)
+
+PICTURE = Group(
+    "PICTURE", None, (_count("width", "of the picture, pixels"), _count("height", "of the picture, pixels"))
+)
+
+PAIRS = Group(
+    "PAIRS",
+    None,
+    (
+        _planes("anchor_sums", "the kept picture of the old scene: three sums, and the number of samples"),
+        _planes("pairs", "PairPlane"),
+    ),
+)
+
+OLD_VALUES = Group(
+    "OLD_VALUES",
+    None,
+    (
+        _table("partner_of_path", "uint", "the place of a path's partner, NO_INDEX or NO_PARTNER"),
+        _table("partner_radiance", "float", "what partners bring: three planes"),
+        _count("partner_stride", "of these planes"),
+    ),
+)
+
+LABELS = Group(
+    "LABELS", None, (_table("labels", "uint", "what a pixel shows, and its class: impact/guides.cl"),)
+)
+
+NORMALS = Group(
+    "NORMALS", None, (_table("guide_normals", "float", "three planes: the normal at a pixel's centre, or 0"),)
+)
+
+GUIDES = Group(
+    "GUIDES",
+    None,
+    (Argument("guides", "__global uint *", "SMOOTHING_STEPS planes of weights of neighbours"),),
+)
+
+COLUMNS = Group(
+    "COLUMNS",
+    None,
+    (
+        _count("row_count", "pixels of a column"),
+        _planes("columns", "sums over columns, in as many planes as there are sums"),
+    ),
+)
+
+COLUMN_SUMS = Group(
+    "COLUMN_SUMS",
+    None,
+    (
+        _count("row_total", "rows of columns in all planes together"),
+        _count("column_total", "columns of a row"),
+        _count("column_count", "columns of a square"),
+        _table("column_sums", "float", "what is in `columns`"),
+        _planes("square_sums", "sums over squares, plane by plane and row by row"),
+    ),
+)
+
+CELLS = Group(
+    "CELLS",
+    None,
+    (
+        _table("cell_sums", "float", "CellSum for each of two classes"),
+        _planes("cells", "CellPlane for each of two classes"),
+    ),
+)
+
+ACTIVITIES = Group("ACTIVITIES", None, (Argument("activities", "__global uint *", "Activity of each patch"),))
+
+SLOPES = Group("SLOPES", None, (_table("slopes", "float", "squared slope of the display curve"),))
+
+SCALE = Group("SCALE", None, (_count("scale_index", "smoothing looks 2^scale_index pixels around"),))
+
+HALVES = Group("HALVES", None, (_planes("halves", "HalfPlane"),))
+
+SMOOTH_HALVES = Group("SMOOTH_HALVES", None, (_planes("smooth_halves", "HalfPlane of the next scale"),))
+
+DETAILS = Group("DETAILS", None, (_planes("details", "DetailPlane"),))
+
+EVIDENCE = Group("EVIDENCE", None, (_planes("evidence", "EvidencePlane of each pixel"),))
+
+POOLED = Group("POOLED", None, (_planes("pooled", "EvidencePlane of the pixels around"),))
+
+SHOWN = Group("SHOWN", None, (_planes("shown", "three planes with a margin: the shown radiance"),))
+
+SHOWN_IMAGE = Group(
+    "SHOWN_IMAGE",
+    None,
+    (_planes("shown_image", "interleaved: the shown radiance, and 1 where there is any"),),
 )
 
 # Of the builder of trees, cl/accel/build_bvh.cl, where Box is declared.
@@ -305,7 +403,9 @@ REFITTING = Group(
 
 GROUPS = (
     LAUNCH, SLOTS, LIST, GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE, PATH_STATE, COMPACTION, BLOCK_MEMORY,
-    RADIANCE, FIRST_HITS, REDUCTION, RESOLUTION,
+    RADIANCE, FIRST_HITS, TRACED, REDUCTION, RESOLUTION, PICTURE, PAIRS, OLD_VALUES, LABELS, NORMALS, GUIDES,
+    COLUMNS, COLUMN_SUMS, CELLS, ACTIVITIES, SLOPES, SCALE, HALVES, SMOOTH_HALVES, DETAILS, EVIDENCE, POOLED,
+    SHOWN, SHOWN_IMAGE,
     ITEMS, MESH, BOXES, CHUNKS, MEASURES, BINS, SIDES, MOVED, LEVEL, SPLITTING, LINKING, LEAVES, REFITTING,
 )  # fmt: skip
 """Every group."""
@@ -325,8 +425,22 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     "write_aovs": (LAUNCH, LIST, SHADING, PATH_STATE),
     "trace_blocks": (LAUNCH, SLOTS, *BLOCK, RADIANCE),
     "first_hits": (LAUNCH, SHADING, PATH_STATE, FIRST_HITS),
-    "reduce": (LAUNCH, SLOTS, REDUCTION),
+    "reduce": (LAUNCH, SLOTS, TRACED, REDUCTION),
     "resolve": (RESOLUTION,),
+    "reduce_pairs": (LAUNCH, SLOTS, TRACED, PAIRS, OLD_VALUES),
+    "weigh_guides": (PICTURE, LABELS, NORMALS, GUIDES),
+    "cell_columns": (PICTURE, PAIRS, LABELS, COLUMNS),
+    "tile_columns": (PICTURE, PAIRS, LABELS, CELLS, SLOPES, COLUMNS),
+    "sum_columns": (COLUMN_SUMS,),
+    "pool_cells": (PICTURE, CELLS),
+    "mark_patches": (PICTURE, CELLS, ACTIVITIES),
+    "split_change": (PICTURE, PAIRS, LABELS, CELLS, ACTIVITIES, HALVES, EVIDENCE, SHOWN),
+    "smooth_change": (PICTURE, GUIDES, ACTIVITIES, SCALE, HALVES, SMOOTH_HALVES, EVIDENCE, DETAILS),
+    "rest_of_change": (PICTURE, ACTIVITIES, HALVES, EVIDENCE, DETAILS),
+    "pool_evidence": (PICTURE, GUIDES, ACTIVITIES, SCALE, EVIDENCE, POOLED),
+    "shrink_detail": (PICTURE, GUIDES, ACTIVITIES, SCALE, POOLED, DETAILS, SHOWN),
+    "store_picture": (PICTURE, PAIRS, SHOWN, SHOWN_IMAGE),
+    "fold_change": (PICTURE, PAIRS, LABELS, CELLS, SHOWN_IMAGE),
     "bound_faces": (ITEMS, MESH, BOXES),
     "measure_chunks": (ITEMS, BOXES, CHUNKS, MEASURES),
     "bin_chunks": (ITEMS, BOXES, CHUNKS, BINS),

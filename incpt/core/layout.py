@@ -36,7 +36,9 @@ NODE_PACK = 0x40000000
 """Flag of a leaf of the top level that is a pack of triangles in world space and no object. Also marks the
 place of a hit in such a pack."""
 NO_INDEX = 0xFFFFFFFF
-"""'None' for every unsigned index: no hit, no triangle, no normals, no medium."""
+"""'None' for every unsigned index: no hit, no triangle, no normals, no medium, no partner."""
+NO_PARTNER = 0xFFFFFFFE
+"""In place of the number of a partner: the path met something that changed, but gets no partner."""
 
 WORK_GROUP_SIZE = 64
 """Work-items per group of the path kernels; lists of paths are padded to a multiple of it."""
@@ -206,6 +208,143 @@ class SamplePlane(IntEnum):
     NORMAL_X = 6
     NORMAL_Y = 7
     NORMAL_Z = 8
+
+
+PATCH_WIDTH = 32
+"""Width of a patch, the pixels that the kernels of cl/impact/ work on at a time: two registers of floats."""
+PATCH_HEIGHT = 8
+CELL_SIZE = 8
+"""Edge of a cell: statistics of pairs are pooled over the pixels of one, each class of pixels for itself."""
+SMOOTHING_SCALES = 4
+"""Passes that take a change apart; that of scale k looks 2^k pixels around."""
+SMOOTHING_STEPS = 5
+"""Different distances that smoothing passes look around, from 1 pixel on, each twice the one before."""
+FIELD_MARGIN = 16
+"""Pixels around the picture in the planes that are smoothed: the longest distance."""
+SLOPES_PER_OCTAVE = 8
+"""Of the table of slopes of the display curve: a power of two, so that bits of a float are a place in it."""
+SLOPE_OCTAVES = 20
+SLOPE_FIRST_OCTAVE = 112
+"""Of the first entry of the table, biased as in a float: 2^-15."""
+
+
+class PairPlane(IntEnum):
+    """Planes of what pairs of paths, in the scene as it is now and in the one before an edit, brought for
+    each pixel. All radiances are differences from the kept picture of the old scene.
+
+    Samples fall into two halves, like the squares of a chequerboard that alternates with the sample index;
+    squares of 4 x 4 pixels alternate too, so that slots that take every fourth pixel have both halves. A pair
+    is a sample of which the radiance in the old scene is known.
+
+    NEW_R_0 and those after it are sums over the samples of a half, in the new scene; OLD_R_0 and those after
+    it over its pairs, in the old one. SAMPLES and PAIRS count them. The moments are sums over both halves of
+    squares in the new scene (of samples) and in the old one, and of new times old (of pairs), means over the
+    channels. TOUCHED counts the samples that met something that changed.
+    """
+
+    NEW_R_0 = 0
+    NEW_G_0 = 1
+    NEW_B_0 = 2
+    NEW_R_1 = 3
+    NEW_G_1 = 4
+    NEW_B_1 = 5
+    OLD_R_0 = 6
+    OLD_G_0 = 7
+    OLD_B_0 = 8
+    OLD_R_1 = 9
+    OLD_G_1 = 10
+    OLD_B_1 = 11
+    SAMPLES_0 = 12
+    SAMPLES_1 = 13
+    PAIRS_0 = 14
+    PAIRS_1 = 15
+    NEW_MOMENT = 16
+    OLD_MOMENT = 17
+    JOINT_MOMENT = 18
+    TOUCHED = 19
+
+
+class CellSum(IntEnum):
+    """Sums over the pixels of a cell that have one class. Squares and products are of deviations from the
+    mean of a pixel; see `TileSums`, which has them too."""
+
+    FREEDOM_NEW = 0
+    SQUARES_NEW = 1
+    FREEDOM_PAIRS = 2
+    SQUARES_OLD = 3
+    PRODUCTS = 4
+    TOUCHED = 5
+
+
+class CellPlane(IntEnum):
+    """What is known of the pixels of a cell that have one class: the variance of a sample in the new and in
+    the old scene and the covariance of both, means over the channels; degrees of freedom of the first and of
+    the others; how many samples met something that changed."""
+
+    NEW_VARIANCE = 0
+    OLD_VARIANCE = 1
+    COVARIANCE = 2
+    FREEDOM_NEW = 3
+    FREEDOM_PAIRS = 4
+    TOUCHED = 5
+
+
+class TileSum(IntEnum):
+    """Sums over the pixels of a tile; see `TileSums`."""
+
+    SAMPLES = 0
+    PAIRS = 1
+    TOUCHED = 2
+    KEPT = 3
+    FREEDOM_NEW = 4
+    FREEDOM_PAIRS = 5
+    SQUARES_NEW = 6
+    SQUARES_OLD = 7
+    PRODUCTS = 8
+    DIFFERENCES = 9
+    ERROR = 10
+
+
+class HalfPlane(IntEnum):
+    """Planes of the change of the picture as the two halves of the samples show it, times the weight that it
+    has, and of these weights. They have a margin, see FIELD_MARGIN."""
+
+    CHANGE_R_0 = 0
+    CHANGE_G_0 = 1
+    CHANGE_B_0 = 2
+    CHANGE_R_1 = 3
+    CHANGE_G_1 = 4
+    CHANGE_B_1 = 5
+    WEIGHT_0 = 6
+    WEIGHT_1 = 7
+
+
+class DetailPlane(IntEnum):
+    """Planes of what one scale of the change is made of: the mean of both halves, and the noise of that mean
+    as the two show it in the pixel alone. With a margin, as HalfPlane."""
+
+    MEAN_R = 0
+    MEAN_G = 1
+    MEAN_B = 2
+    NOISE = 3
+
+
+class EvidencePlane(IntEnum):
+    """Planes of what is summed up around a pixel to tell signal from noise in a detail: products of the two
+    halves and squares of their difference, both times a weight, and the weight. With a margin."""
+
+    SIGNAL = 0
+    NOISE = 1
+    WEIGHT = 2
+
+
+class Activity(IntEnum):
+    """Of a patch: nothing changes near it; something that is smoothed reaches into it or into its neighbours;
+    the picture may change there."""
+
+    IDLE = 0
+    NEAR = 1
+    CHANGED = 2
 
 
 class PathClass(IntFlag):
@@ -505,6 +644,14 @@ def c_header() -> str:
         (ShadowPlane, "SHADOW"),
         (LightPlane, "LIGHT"),
         (SamplePlane, "SAMPLE"),
+        (PairPlane, "PAIR"),
+        (CellSum, "CELL_SUM"),
+        (CellPlane, "CELL"),
+        (TileSum, "TILE_SUM"),
+        (HalfPlane, "HALF"),
+        (DetailPlane, "DETAIL"),
+        (EvidencePlane, "EVIDENCE"),
+        (Activity, "ACTIVITY"),
         (PathClass, "CLASS"),
         (SlotFlag, "SLOT"),
         (MaterialFlag, "MATERIAL"),

@@ -53,20 +53,29 @@ def tone_map(linear: npt.ArrayLike, exposure: float = 0.0, curve: str = "agx") -
     Infinite radiance becomes white; undefined pixels (NaN) become magenta, so that they are seen.
     Raises InputError.
     """
+    radiance = numbers("image", linear, np.float64)
+    encoded = display_values(np.nan_to_num(radiance, posinf=1e30, neginf=0.0), exposure, curve)
+    result: npt.NDArray[np.uint8] = np.rint(encoded * 255.0).astype(np.uint8)
+    result[np.isnan(radiance).any(axis=-1)] = UNDEFINED_PIXEL
+    return result
+
+
+def display_values(
+    linear: npt.ArrayLike, exposure: float = 0.0, curve: str = "agx"
+) -> npt.NDArray[np.float64]:
+    """(..., 3) linear radiance, finite, to display values 0 to 1, which `tone_map` rounds. Raises
+    InputError."""
     one_of("curve", curve, CURVES)
     require("exposure", exposure, REAL, "a number of stops")
     if not abs(exposure) <= LARGEST_EXPOSURE:
         span = f"{-LARGEST_EXPOSURE} to {LARGEST_EXPOSURE}"
         raise InputError(f"exposure: {described(exposure)} is out of range; use {span}")
-    radiance = numbers("image", linear, np.float64)
+    radiance = np.asarray(linear, np.float64)
     if radiance.shape[-1:] != (3,):
         raise InputError(f"image: has shape {radiance.shape}; a picture has shape (height, width, 3)")
-    undefined = np.isnan(radiance).any(axis=-1)
-    scaled = np.clip(np.nan_to_num(radiance, posinf=1e30, neginf=0.0) * 2.0**exposure, 0.0, 1e30)
-    encoded = {"agx": _agx, "filmic": _filmic, "srgb": _srgb}[curve](scaled)
-    result: npt.NDArray[np.uint8] = np.rint(np.clip(encoded, 0.0, 1.0) * 255.0).astype(np.uint8)
-    result[undefined] = UNDEFINED_PIXEL
-    return result
+    scaled = np.clip(radiance * 2.0**exposure, 0.0, 1e30)
+    shown: npt.NDArray[np.float64] = {"agx": _agx, "filmic": _filmic, "srgb": _srgb}[curve](scaled)
+    return np.clip(shown, 0.0, 1.0)
 
 
 def _srgb(linear: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

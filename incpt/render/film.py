@@ -164,6 +164,11 @@ class Film:
         for one in self.passes if passes is None else passes:
             self._layers[one.name].reduce(size, **values)
 
+    @property
+    def nonfinite(self) -> cl.Buffer:
+        """Where kernels count samples that are not finite."""
+        return self._nonfinite
+
     def first_plane(self, name: str) -> int:
         """Where the planes of a pass begin in the path buffer."""
         return int(self._layers[name].first_plane)

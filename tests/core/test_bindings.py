@@ -16,7 +16,7 @@ from incpt.core.bindings import BLOCK, KERNELS, Argument, Group
 from incpt.device import program
 from incpt.device.device import Device
 
-KERNEL = re.compile(r"__kernel\b[^{;]*?(\w+)\([A-Z]+_PARAMETERS")
+KERNEL = re.compile(r"__kernel\b[^{;]*?(\w+)\([A-Z_]+_PARAMETERS")
 
 
 def files_of_kernels() -> dict[str, str]:

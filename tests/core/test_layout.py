@@ -63,6 +63,13 @@ def test_constants_and_planes_are_in_the_header() -> None:
         layout.ShadowPlane,
         layout.LightPlane,
         layout.PathList,
+        layout.PairPlane,
+        layout.CellSum,
+        layout.CellPlane,
+        layout.TileSum,
+        layout.HalfPlane,
+        layout.DetailPlane,
+        layout.EvidencePlane,
     ],
 )
 def test_planes_are_numbered_without_gaps(enum: type[IntEnum]) -> None:
