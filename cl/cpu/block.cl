@@ -13,6 +13,7 @@
 typedef struct {
     const Params *params;
     __global const Slot *slots;
+    __global const uint *places;
     __global float *path_buffer;
     uint first, size; // the place of its first path in the path buffer, and how many paths it has
     Geometry geometry;
@@ -35,9 +36,10 @@ INLINE uint block_size(uint path_count) {
 }
 
 // The block of a kernel with BLOCK_PARAMETERS.
-#define BLOCK_OF(params, slots, path_buffer, path_count)                                                     \
+#define BLOCK_OF(params, slots, places, path_buffer, path_count)                                             \
     {params,                                                                                                 \
      slots,                                                                                                  \
+     places,                                                                                                 \
      path_buffer,                                                                                            \
      block_first(),                                                                                          \
      block_size(path_count),                                                                                 \

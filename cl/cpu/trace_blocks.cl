@@ -52,7 +52,7 @@ STAGE void start_paths(const Block *block) {
     const uint first = block->first, size = block->size;
     LANES
     for (int i = 0; i < (int)size; i++) {
-        generate_path(block->params, block->slots, &block->state, i, first + i);
+        generate_path(block->params, block->slots, block->places, &block->state, i, first + i);
         store_result(&block->state, i, i);
         store3(block->state.radiance, BLOCK_STRIDE, i, vec3(0.0f, 0.0f, 0.0f));
     }
@@ -287,8 +287,8 @@ INLINE void trace_block(const Block *block) {
 }
 
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
-trace_blocks(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, BLOCK_PARAMETERS, RADIANCE_PARAMETERS) {
-    const Block block = BLOCK_OF(&params, slots, path_buffer, params.path_count);
+trace_blocks(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, PLACES_PARAMETERS, BLOCK_PARAMETERS, RADIANCE_PARAMETERS) {
+    const Block block = BLOCK_OF(&params, slots, places, path_buffer, params.path_count);
     const uint first = block.first, size = block.size;
     trace_block(&block);
     for (uint c = 0; c < 3; c++)

@@ -78,6 +78,12 @@ LAUNCH = Group("LAUNCH", None, (Argument("params", "Params", "the settings of th
 
 SLOTS = Group("SLOTS", None, (_table("slots", "Slot", "which tile and which samples are in which slot"),))
 
+PLACES = Group(
+    "PLACES",
+    None,
+    (_table("places", "uint", "with params.listed: which of the paths of all slots these are"),),
+)
+
 LIST = Group(
     "LIST",
     None,
@@ -402,10 +408,10 @@ REFITTING = Group(
 )
 
 GROUPS = (
-    LAUNCH, SLOTS, LIST, GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE, PATH_STATE, COMPACTION, BLOCK_MEMORY,
-    RADIANCE, FIRST_HITS, TRACED, REDUCTION, RESOLUTION, PICTURE, PAIRS, OLD_VALUES, LABELS, NORMALS, GUIDES,
-    COLUMNS, COLUMN_SUMS, CELLS, ACTIVITIES, SLOPES, SCALE, HALVES, SMOOTH_HALVES, DETAILS, EVIDENCE, POOLED,
-    SHOWN, SHOWN_IMAGE,
+    LAUNCH, SLOTS, PLACES, LIST, GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE, PATH_STATE, COMPACTION,
+    BLOCK_MEMORY, RADIANCE, FIRST_HITS, TRACED, REDUCTION, RESOLUTION, PICTURE, PAIRS, OLD_VALUES,
+    LABELS, NORMALS, GUIDES, COLUMNS, COLUMN_SUMS, CELLS, ACTIVITIES, SLOPES, SCALE, HALVES, SMOOTH_HALVES,
+    DETAILS, EVIDENCE, POOLED, SHOWN, SHOWN_IMAGE,
     ITEMS, MESH, BOXES, CHUNKS, MEASURES, BINS, SIDES, MOVED, LEVEL, SPLITTING, LINKING, LEAVES, REFITTING,
 )  # fmt: skip
 """Every group."""
@@ -414,7 +420,7 @@ BLOCK = (GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE, BLOCK_MEMORY)
 """What kernels over blocks of paths need of a scene, and the memory of a block: BLOCK_PARAMETERS in C."""
 
 KERNELS: dict[str, tuple[Group, ...]] = {
-    "generate": (LAUNCH, SLOTS, PATH_STATE),
+    "generate": (LAUNCH, SLOTS, PLACES, PATH_STATE),
     "compact": (LAUNCH, LIST, PATH_STATE, COMPACTION),
     "intersect": (LAUNCH, LIST, GEOMETRY, SHADING, PATH_STATE),
     "sample_lights": (LAUNCH, LIST, EMITTERS, PATH_STATE),
@@ -423,7 +429,7 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     "shade_miss": (LAUNCH, LIST, SHADING, EMITTERS, PATH_STATE),
     "trace_shadow": (LAUNCH, LIST, GEOMETRY, PATH_STATE),
     "write_aovs": (LAUNCH, LIST, SHADING, PATH_STATE),
-    "trace_blocks": (LAUNCH, SLOTS, *BLOCK, RADIANCE),
+    "trace_blocks": (LAUNCH, SLOTS, PLACES, *BLOCK, RADIANCE),
     "first_hits": (LAUNCH, SHADING, PATH_STATE, FIRST_HITS),
     "reduce": (LAUNCH, SLOTS, TRACED, REDUCTION),
     "resolve": (RESOLUTION,),

@@ -575,6 +575,7 @@ PARAMS = _packed(
         ("environment_width", np.uint32),
         ("environment_height", np.uint32),
         ("environment_rotation", np.float32),  # as a fraction of a full turn
+        ("listed", np.uint32),  # 1: paths take their places in the slots from a list
         ("last_ray", np.uint32),  # number of the ray with which all paths end, see stages.py
         ("sees_sky", np.uint32),  # 1: light comes from far away
         ("pixel_center", np.uint32),  # 1: camera rays go through pixel centres (first hits)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +14,7 @@ from incpt.tables.scene_tables import SceneTables
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Paths to trace, those of `slots` in order, and where they leave what they bring.
+    """Paths to trace, those of `slots` in order or those of a list, and where they leave what they bring.
 
     tables       the scene that they are traced in.
     params       () layout.PARAMS as `params.path_params` makes them: which paths these are. What follows from
@@ -24,6 +25,8 @@ class Batch:
     path_buffer  planes of params["buffer_stride"] floats, which get what each path brings: those of radiance
                  in layout.SamplePlane, with `aovs` all of them.
     aovs         whether auxiliary images are part of it.
+    places       uints on the device: which of the paths of `slots` these are. Path number k of the list is
+                 number k of the path buffer. None: the first ones.
     """
 
     tables: SceneTables
@@ -32,8 +35,14 @@ class Batch:
     path_count: int
     path_buffer: cl.Buffer
     aovs: bool = False
+    places: cl.Buffer | None = None
 
     @property
     def features(self) -> tuple[str, ...]:
         """What chooses the variants of the kernels that trace these paths; see `program.FEATURES`."""
         return (*self.tables.variant, *(("AOVS",) if self.aovs else ()))
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """What kernels are bound to of it, by name. Kernels that have no use for a buffer get any one."""
+        return {"slots": self.slots, "places": self.slots if self.places is None else self.places}

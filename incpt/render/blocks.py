@@ -35,8 +35,9 @@ class BlockTracer:
         tables = batch.tables
         params = launch_params(batch.params, tables)
         params["path_count"] = batch.path_count
+        params["listed"] = batch.places is not None
         kernel = self.device.kernel("trace_blocks", features=batch.features)
-        values = {"params": params, "slots": batch.slots, "path_buffer": batch.path_buffer}
+        values = {**batch.values, "params": params, "path_buffer": batch.path_buffer}
         launch(self.device, kernel, bindings.KERNELS["trace_blocks"], batch.path_count, values, tables)
 
     def first_hits(self, batch: Batch, surface: cl.Buffer, object_ids: cl.Buffer) -> None:

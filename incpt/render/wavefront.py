@@ -151,6 +151,7 @@ class Wavefront:
     def _chunk(self, batch: Batch, first: int, size: int) -> _Chunk:
         params = launch_params(batch.params, batch.tables)
         params["first_path"], params["path_count"], params["path_stride"] = first, size, self.stride
+        params["listed"] = batch.places is not None
         return _Chunk(batch, params, _launches_of(batch.features))
 
     def _trace_chunk(self, chunk: _Chunk) -> None:
@@ -181,7 +182,7 @@ class Wavefront:
 
     def _generate(self, chunk: _Chunk) -> None:
         """Start the paths of a chunk, and list those that lie in the image."""
-        self._launch("generate", chunk, chunk.size, slots=chunk.batch.slots)
+        self._launch("generate", chunk, chunk.size)
         self.device.fill(self._lengths, 0, self._lengths.size)
         self._compact(chunk, 0, chunk.size, None, (PathList.LIVE,))
 
@@ -231,7 +232,8 @@ class Wavefront:
     ) -> None:
         """Launch a kernel; its arguments are `values` by name, the planes of paths, and the buffers of the
         scene."""
-        known = {**self._planes, "params": chunk.params, "radiance": chunk.batch.path_buffer, **values}
+        known = {**self._planes, **chunk.batch.values, "params": chunk.params}
+        known |= {"radiance": chunk.batch.path_buffer, **values}
         arguments = bindings.arguments(bindings.KERNELS[name], known, chunk.batch.tables)
         kernel = self.device.kernel(name, features=features)
         self.device.launch(kernel, max(size, self._least_size), *arguments)

@@ -54,3 +54,22 @@ def test_the_same_paths_in_another_scene(other: Callable[[], Scene], in_blocks: 
     film.reduce(batch.params, plan, batch.slots, batch.path_buffer)
     np.testing.assert_array_equal(film.image(), fresh.image(alpha=True))
     assert batch.params == before and fresh.image().any()
+
+
+@pytest.mark.parametrize("in_blocks", [False, True], ids=["wavefront", "blocks"])
+@pytest.mark.parametrize("make", [mixed_scene, cornell], ids=lambda make: make.__name__)
+def test_the_paths_of_a_list(make: Callable[[], Scene], in_blocks: bool, device: Device) -> None:
+    """They bring what they bring among all paths, in the order of the list, to the bit."""
+    session = Session(replace(make(), settings=mixed_scene().settings), device=device)
+    tracer = tracer_of(device) if in_blocks else Wavefront(device)
+    slots = 8 * session.grid.count
+    path_buffer = session._state.path_buffer.grown(device, slots, 8)
+    batch = session._batch(session.progress.planned(slots).slots, path_buffer)
+    tracer.trace(batch)
+    every = device.read(path_buffer.floats, np.empty((3, path_buffer.stride), np.float32))
+    random = np.random.default_rng(0)
+    for places in ([5], random.permutation(batch.path_count)[:1500], random.permutation(batch.path_count)):
+        listed = np.array(places, np.uint32)
+        tracer.trace(replace(batch, places=device.upload(listed), path_count=len(listed)))
+        found = device.read(path_buffer.floats, np.empty((3, path_buffer.stride), np.float32))
+        np.testing.assert_array_equal(found[:, : len(listed)], every[:, listed])
