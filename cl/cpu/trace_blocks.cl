@@ -24,6 +24,9 @@
 #ifdef AOVS
 #include "path/write_aovs.cl"
 #endif
+#ifdef CHANGES
+#include "path/changes.cl"
+#endif
 #ifdef BRUTE_FORCE
 #include "cpu/brute_force.cl"
 #endif
@@ -128,6 +131,27 @@ INLINE void trace_rays(const Block *block, BlockRay *ray) {
     ray->count = trace_nearest(block, ray->count, ray->number == 0);
     classify_hits(block, ray);
 }
+
+#ifdef CHANGES
+// Notes which paths have met something that changed, now that their rays are traced.
+STAGE void touch_rays(const Block *block, const BlockRay *ray) {
+    const State *traced = &block->traced;
+    const Changes *changes = block->changes;
+    const uint count = ray->count;
+    __local const float *limits = PLANES(block->memory, RAW_HITS) + RAW_HIT_DISTANCE * BLOCK_STRIDE;
+    for (uint box = 0; box < changes->change.box_count; box += BOXES_AT_ONCE) {
+        LANES
+        for (int i = 0; i < (int)count; i++)
+            touch(changes, load_result(traced, i),
+                  crosses_boxes(&changes->change, box, load_ray(traced->rays, BLOCK_STRIDE, i), limits[i]));
+    }
+    if (changes->change.has_objects) {
+        LANES
+        for (int i = 0; i < (int)count; i++)
+            touch(changes, load_result(traced, i), is_changed(changes, load_raw_hit(block, i).object));
+    }
+}
+#endif
 
 STAGE void shade_misses(const Block *block, const BlockRay *ray) {
     __local uint *list = UINT_PLANES(block->memory, LIST);
@@ -259,6 +283,29 @@ STAGE void finish_paths(const Block *block, BlockRay *ray) {
 #endif
 
 #ifdef LIGHT_SAMPLING
+#ifdef CHANGES
+// As touch_rays, of the shadow rays that are going to be traced.
+STAGE void touch_shadow_rays(const Block *block, const BlockRay *ray) {
+    const State *state = &block->state;
+    const Changes *changes = block->changes;
+    const uint count = ray->count;
+    __local const float *limits = state->shadows + SHADOW_DISTANCE * BLOCK_STRIDE;
+    for (uint box = 0; box < changes->change.box_count; box += BOXES_AT_ONCE) {
+        LANES
+        for (int i = 0; i < (int)count; i++) {
+            int asked = (load_class(state, i) & CLASS_SHADOW) != 0u;
+            Ray shadow = load_ray(state->shadows, BLOCK_STRIDE, i);
+            // Where there is no shadow ray, its planes hold something else, which is slow to calculate with.
+            Vec3 nothing = vec3(0.0f, 0.0f, 0.0f);
+            shadow.origin = select(asked, shadow.origin, nothing);
+            shadow.direction = select(asked, shadow.direction, nothing);
+            uint crossed = crosses_boxes(&changes->change, box, shadow, asked ? limits[i] : 0.0f);
+            touch(changes, load_result(state, i), asked ? crossed : 0u);
+        }
+    }
+}
+#endif
+
 // Traces the shadow rays that paths ask for, and adds what they bring.
 STAGE void trace_shadows(const Block *block, const BlockRay *ray) {
     const uint count = ray->count;
@@ -287,8 +334,10 @@ INLINE void trace_block(const Block *block) {
 }
 
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
-trace_blocks(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, PLACES_PARAMETERS, BLOCK_PARAMETERS, RADIANCE_PARAMETERS) {
-    const Block block = BLOCK_OF(&params, slots, places, path_buffer, params.path_count);
+trace_blocks(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, PLACES_PARAMETERS, BLOCK_PARAMETERS, RADIANCE_PARAMETERS,
+             CHANGES_PARAMETERS) {
+    const Changes changes = {change, changed_objects, touched + block_first()};
+    const Block block = BLOCK_OF(&params, slots, places, path_buffer, &changes, params.path_count);
     const uint first = block.first, size = block.size;
     trace_block(&block);
     for (uint c = 0; c < 3; c++)

@@ -27,8 +27,6 @@ LARGEST_SERIAL_RANGE = 1 << 15
 CHUNK = 1 << 12
 """Boxes that one work-item takes of such a range."""
 
-_FILE = "build_bvh"
-
 # Rounding errors of a hit in units of float32's half ulp: of its position (seven operations of interpolation
 # and three of transform, pbrt-v4 section 6.8), and of the next ray's test against the same triangle, which
 # was measured (4 do, 2 do not).
@@ -143,7 +141,7 @@ def build_boxes(
 def _launch(device: Device, name: str, count: int, work_group: int | None = None, **values: Any) -> None:
     """Launch a kernel of the builder over `count` work-items; `values` are its other arguments."""
     arguments = bindings.arguments(bindings.KERNELS[name], {"count": count, **values})
-    device.launch(device.kernel(name, _FILE), count, *arguments, work_group=work_group)
+    device.launch(device.kernel(name, bindings.FILES[name]), count, *arguments, work_group=work_group)
 
 
 class _Level:

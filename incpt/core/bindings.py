@@ -178,6 +178,16 @@ RADIANCE = Group(
     (Argument("path_buffer", "__global float *", "what each path of the step brings: SamplePlane"),),
 )
 
+CHANGES = Group(
+    "CHANGES",
+    "Changes",
+    (
+        Argument("change", "Change", "what differs between two scenes"),
+        _table("changed_objects", "uint", "of each object 1 where a hit on it is enough"),
+        Argument("touched", "__global uint *", "of each path 1 where it met something that changed"),
+    ),
+)
+
 FIRST_HITS = Group(
     "FIRST_HITS",
     None,
@@ -409,7 +419,7 @@ REFITTING = Group(
 
 GROUPS = (
     LAUNCH, SLOTS, PLACES, LIST, GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE, PATH_STATE, COMPACTION,
-    BLOCK_MEMORY, RADIANCE, FIRST_HITS, TRACED, REDUCTION, RESOLUTION, PICTURE, PAIRS, OLD_VALUES,
+    BLOCK_MEMORY, RADIANCE, CHANGES, FIRST_HITS, TRACED, REDUCTION, RESOLUTION, PICTURE, PAIRS, OLD_VALUES,
     LABELS, NORMALS, GUIDES, COLUMNS, COLUMN_SUMS, CELLS, ACTIVITIES, SLOPES, SCALE, HALVES, SMOOTH_HALVES,
     DETAILS, EVIDENCE, POOLED, SHOWN, SHOWN_IMAGE,
     ITEMS, MESH, BOXES, CHUNKS, MEASURES, BINS, SIDES, MOVED, LEVEL, SPLITTING, LINKING, LEAVES, REFITTING,
@@ -429,7 +439,9 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     "shade_miss": (LAUNCH, LIST, SHADING, EMITTERS, PATH_STATE),
     "trace_shadow": (LAUNCH, LIST, GEOMETRY, PATH_STATE),
     "write_aovs": (LAUNCH, LIST, SHADING, PATH_STATE),
-    "trace_blocks": (LAUNCH, SLOTS, PLACES, *BLOCK, RADIANCE),
+    "touch_rays": (LAUNCH, LIST, PATH_STATE, CHANGES),
+    "touch_shadow_rays": (LAUNCH, LIST, PATH_STATE, CHANGES),
+    "trace_blocks": (LAUNCH, SLOTS, PLACES, *BLOCK, RADIANCE, CHANGES),
     "first_hits": (LAUNCH, SHADING, PATH_STATE, FIRST_HITS),
     "reduce": (LAUNCH, SLOTS, TRACED, REDUCTION),
     "resolve": (RESOLUTION,),
@@ -458,6 +470,30 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     "refit_nodes": (ITEMS, MESH, LEAVES, REFITTING),
 }
 """The groups that each kernel takes, in order."""
+
+FILES = {
+    "touch_rays": "changes",
+    "touch_shadow_rays": "changes",
+    "cell_columns": "cell_statistics",
+    "pool_cells": "cell_statistics",
+    "mark_patches": "cell_statistics",
+    "split_change": "shrinkage",
+    "smooth_change": "shrinkage",
+    "rest_of_change": "shrinkage",
+    "pool_evidence": "shrinkage",
+    "shrink_detail": "shrinkage",
+    "store_picture": "shrinkage",
+    "bound_faces": "build_bvh",
+    "measure_chunks": "build_bvh",
+    "bin_chunks": "build_bvh",
+    "scatter_chunks": "build_bvh",
+    "copy_chunks": "build_bvh",
+    "split_ranges": "build_bvh",
+    "link_children": "build_bvh",
+    "refit_packs": "build_bvh",
+    "refit_nodes": "build_bvh",
+}
+"""The files of cl/ that hold several kernels, by these; other kernels stand in a file of their name."""
 
 _OF_SCENE = {
     argument.name for group in (GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE) for argument in group.arguments

@@ -40,6 +40,9 @@ NO_INDEX = 0xFFFFFFFF
 NO_PARTNER = 0xFFFFFFFE
 """In place of the number of a partner: the path met something that changed, but gets no partner."""
 
+MOST_CHANGED_BOXES = 8
+"""Boxes around what changed between two scenes: rays are tested against all of them, two at a time."""
+
 WORK_GROUP_SIZE = 64
 """Work-items per group of the path kernels; lists of paths are padded to a multiple of it."""
 
@@ -582,6 +585,19 @@ PARAMS = _packed(
     ]
 )
 
+CHANGE = _packed(
+    [
+        # What differs between two scenes. Rays are tested against boxes around the objects that are elsewhere
+        # or have another shape, as they were and as they are: least and greatest x, y and z of each.
+        ("least", np.float32, (MOST_CHANGED_BOXES, 3)),
+        ("greatest", np.float32, (MOST_CHANGED_BOXES, 3)),
+        ("box_count", np.uint32),  # an even number
+        ("reach", np.float32),  # the largest coordinate of the boxes
+        ("padding", np.float32),  # of boxes, per metre of `reach` and of the largest coordinate of an origin
+        ("has_objects", np.uint32),  # 1: there are objects on which a hit is enough
+    ]
+)
+
 STRUCTS: dict[str, np.dtype[np.void]] = {
     "Node": NODE,
     "TrianglePack": TRIANGLE_PACK,
@@ -593,6 +609,7 @@ STRUCTS: dict[str, np.dtype[np.void]] = {
     "Slot": SLOT,
     "Camera": CAMERA,
     "Params": PARAMS,
+    "Change": CHANGE,
 }
 
 _C_TYPES = {np.dtype(np.float32): "float", np.dtype(np.int32): "int", np.dtype(np.uint32): "uint"}

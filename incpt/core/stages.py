@@ -28,6 +28,8 @@ class When(Flag):
     """There are materials that let light through."""
     AOVS = auto()
     """Auxiliary images are asked for."""
+    CHANGES = auto()
+    """It is asked of paths whether they meet something that changed between two scenes."""
     SKY = auto()
     """Light comes from far away."""
     CAMERA_RAY = auto()
@@ -61,6 +63,7 @@ class Stage:
 
 STAGES = (
     Stage("intersect", "trace_rays", PathList.LIVE, sorts=(PathList.SURFACE, PathList.MISS, PathList.MEDIUM)),
+    Stage("touch_rays", "touch_rays", PathList.LIVE, When.CHANGES),
     Stage("shade_miss", "shade_misses", PathList.MISS, When.SKY),
     Stage(None, "setup_surfaces", PathList.LIVE),
     Stage("write_aovs", "write_aovs", PathList.LIVE, When.AOVS | When.CAMERA_RAY),
@@ -71,16 +74,19 @@ STAGES = (
           sorts=(PathList.SURFACE, PathList.SHADOW, PathList.LIVE)),
     Stage("shade", "shade_surfaces", PathList.SURFACE, When.GOES_ON, sorts=(PathList.SHADOW, PathList.LIVE)),
     Stage("shade", "finish_paths", PathList.SURFACE, When.ENDS),
+    Stage("touch_shadow_rays", "touch_shadow_rays", PathList.SHADOW,
+          When.CHANGES | When.LIGHTS | When.GOES_ON),
     Stage("trace_shadow", "trace_shadows", PathList.SHADOW, When.LIGHTS | When.GOES_ON),
 )  # fmt: skip
 """All stages of a ray, in order. They lie between `generate`, which starts paths, and the next ray."""
 
-_BY_FEATURES = When.LIGHTS | When.MEDIA | When.AOVS
+_BY_FEATURES = When.LIGHTS | When.MEDIA | When.AOVS | When.CHANGES
 _HOLDS = {
     "ENVIRONMENT_IMAGE": When.LIGHTS,
     "TRIANGLE_LIGHTS": When.LIGHTS,
     "MEDIA": When.MEDIA | When.GOES_ON,
     "AOVS": When.AOVS,
+    "CHANGES": When.CHANGES,
 }
 """What holds on every ray where kernels have a feature."""
 

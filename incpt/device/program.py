@@ -37,6 +37,7 @@ FEATURES = {
     "TOP_LEVEL_ONLY": "Every triangle lies in the packs of the top level, in world space.",
     "BRUTE_FORCE": "The triangles of the top level are so few that blocks test them without a tree.",
     "AOVS": "Paths write base colour and normal of the first surface into the path buffer.",
+    "CHANGES": "Blocks tell of each path whether it met something that changed between two scenes.",
     "EMISSION_ONLY": "No path goes on after this ray, so that surfaces only emit.",
     "COUNT_VISITS": "Traversal counts the nodes and packs that it tests, for the benchmark of rays.",
     "MIS_ONLY_LIGHT": "Light sampling alone brings light, where it can, for the tests of its weights.",

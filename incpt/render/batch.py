@@ -9,7 +9,19 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
+from incpt.core import layout
+from incpt.tables.change_tables import ChangeTables
 from incpt.tables.scene_tables import SceneTables
+
+
+@dataclass(frozen=True, eq=False)
+class TouchTest:
+    """Asks of each path whether it meets something of `changes`, the difference between the scene that the
+    paths are traced in and another one. `touched` has a uint for each path of the path buffer, which gets 1
+    or 0; the rest of its buffer holds nothing of use afterwards."""
+
+    changes: ChangeTables
+    touched: cl.Buffer
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +39,7 @@ class Batch:
     aovs         whether auxiliary images are part of it.
     places       uints on the device: which of the paths of `slots` these are. Path number k of the list is
                  number k of the path buffer. None: the first ones.
+    touch_test   what else is asked of the paths.
     """
 
     tables: SceneTables
@@ -36,13 +49,22 @@ class Batch:
     path_buffer: cl.Buffer
     aovs: bool = False
     places: cl.Buffer | None = None
+    touch_test: TouchTest | None = None
 
     @property
     def features(self) -> tuple[str, ...]:
         """What chooses the variants of the kernels that trace these paths; see `program.FEATURES`."""
-        return (*self.tables.variant, *(("AOVS",) if self.aovs else ()))
+        asked = {"AOVS": self.aovs, "CHANGES": self.touch_test is not None}
+        return (*self.tables.variant, *(name for name, is_asked in asked.items() if is_asked))
 
     @property
     def values(self) -> dict[str, Any]:
         """What kernels are bound to of it, by name. Kernels that have no use for a buffer get any one."""
-        return {"slots": self.slots, "places": self.slots if self.places is None else self.places}
+        test, unused = self.touch_test, self.slots
+        return {
+            "slots": self.slots,
+            "places": unused if self.places is None else self.places,
+            "change": np.zeros((), layout.CHANGE) if test is None else test.changes.change,
+            "changed_objects": unused if test is None else test.changes.objects,
+            "touched": unused if test is None else test.touched,
+        }

@@ -36,6 +36,8 @@ class BlockTracer:
         params = launch_params(batch.params, tables)
         params["path_count"] = batch.path_count
         params["listed"] = batch.places is not None
+        if batch.touch_test is not None:
+            self.device.fill(batch.touch_test.touched, 0, 4 * batch.path_count)
         kernel = self.device.kernel("trace_blocks", features=batch.features)
         values = {**batch.values, "params": params, "path_buffer": batch.path_buffer}
         launch(self.device, kernel, bindings.KERNELS["trace_blocks"], batch.path_count, values, tables)

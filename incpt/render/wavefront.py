@@ -97,6 +97,8 @@ class Wavefront:
 
     def trace(self, batch: Batch) -> None:
         """See `tracer.Tracer`."""
+        if batch.touch_test is not None:
+            self.device.fill(batch.touch_test.touched, 0, 4 * batch.path_count)
         for chunk in self._chunks(batch):
             self._trace_chunk(chunk)
 
@@ -235,7 +237,7 @@ class Wavefront:
         known = {**self._planes, **chunk.batch.values, "params": chunk.params}
         known |= {"radiance": chunk.batch.path_buffer, **values}
         arguments = bindings.arguments(bindings.KERNELS[name], known, chunk.batch.tables)
-        kernel = self.device.kernel(name, features=features)
+        kernel = self.device.kernel(name, bindings.FILES.get(name), features)
         self.device.launch(kernel, max(size, self._least_size), *arguments)
 
 

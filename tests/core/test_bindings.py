@@ -60,6 +60,11 @@ def test_every_kernel_is_declared() -> None:
     assert FILES.keys() == KERNELS.keys()
 
 
+def test_files_of_kernels_are_known() -> None:
+    assert {name: bindings.FILES.get(name, name) for name in KERNELS} == FILES
+    assert bindings.FILES.keys() <= KERNELS.keys()
+
+
 @pytest.mark.parametrize("name", sorted(KERNELS))
 def test_kernels_declare_what_is_bound(device: Device, name: str) -> None:
     if name == "trace_blocks" and device.block_paths is None:

@@ -12,7 +12,7 @@ from incpt.core import bindings, stages
 from incpt.core.layout import MOST_RAYS, PathList
 from incpt.core.stages import STAGES, When, holding, last_ray, stages_of
 
-FEATURES = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS", "MEDIA", "AOVS")
+FEATURES = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS", "MEDIA", "AOVS", "CHANGES")
 VARIANTS = list(chain.from_iterable(combinations(FEATURES, n) for n in range(len(FEATURES) + 1)))
 
 
@@ -21,14 +21,15 @@ def kernels_on(features: tuple[str, ...], holds: When) -> list[str]:
 
 
 def test_a_ray_from_the_camera_with_everything() -> None:
-    assert kernels_on(("ENVIRONMENT_IMAGE", "MEDIA", "AOVS"), holding(0, 5, sees_sky=True)) == [
-        "intersect", "shade_miss", "write_aovs", "sample_lights", "sample_lights", "shade_medium", "shade",
-        "trace_shadow",
+    assert kernels_on(FEATURES, holding(0, 5, sees_sky=True)) == [
+        "intersect", "touch_rays", "shade_miss", "write_aovs", "sample_lights", "sample_lights",
+        "shade_medium", "shade", "touch_shadow_rays", "trace_shadow",
     ]  # fmt: skip
 
 
 def test_what_there_is_not_is_left_out() -> None:
     assert kernels_on((), holding(1, 5, sees_sky=False)) == ["intersect", "shade"]
+    assert kernels_on(("CHANGES",), holding(1, 5, sees_sky=False)) == ["intersect", "touch_rays", "shade"]
     assert kernels_on(("AOVS",), holding(1, 5, sees_sky=True)) == ["intersect", "shade_miss", "shade"]
     lit = ("TRIANGLE_LIGHTS",)
     assert kernels_on(lit, holding(1, 5, False)) == ["intersect", "sample_lights", "shade", "trace_shadow"]

@@ -12,7 +12,7 @@ import pytest
 from support.small_scenes import mixed_scene
 
 from incpt.benchmarks.kit.scenes import cornell, glass
-from incpt.core import layout, stages
+from incpt.core import bindings, layout, stages
 from incpt.core.stages import STAGES
 from incpt.device import program
 from incpt.device.device import Device
@@ -119,6 +119,6 @@ def test_both_schedules_follow_the_table_of_stages(
 def test_kernels_get_the_features_that_they_ask_for() -> None:
     scene_has = {"ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS", "MEDIA"}
     for kernel in {stage.kernel for stage in STAGES} - {None}:
-        text = program.source(program.files()[kernel])
+        text = program.source(program.files()[bindings.FILES.get(kernel, kernel)])
         asked = {name for name in scene_has if re.search(rf"(ifn?def |defined\(){name}\b", text)}
         assert asked == set(wavefront._FEATURES.get(kernel, ())), kernel

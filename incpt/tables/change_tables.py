@@ -1,0 +1,157 @@
+"""What kernels know of the difference of two scenes, by which they tell which paths meet it
+(cl/path/changes.cl)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from incpt.core import affine, layout
+from incpt.device.device import Device
+from incpt.scene.change import Change, diff
+from incpt.scene.model import Object, Scene
+
+_PADDING = 2.0**-19
+"""Of boxes, per metre of distance from the world's origin. Float32 rounds by 2^-24, and some ten roundings
+are on the way from vertices and ray to a hit (cl/accel/bvh.cl)."""
+
+_MOST_PAIRED = 64
+"""Boxes of which all pairs are looked at; more are put together by place before."""
+
+Boxes = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """What differs between two scenes with the same camera and the same environment, for the paths of the
+    second.
+
+    boxes    (N, 2, 3) bounds in world space around objects that are elsewhere, have another shape, or have
+             come or gone, where they were and where they are. None where only materials differ.
+    objects  (len(objects),) whether it is enough that a path meets the object, whose material is another one.
+    padding  of the boxes, per metre of distance from the world's origin.
+    """
+
+    boxes: Boxes
+    objects: npt.NDArray[np.bool_]
+    padding: float
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no path can meet any of it."""
+        return not (len(self.boxes) or self.objects.any())
+
+
+@dataclass(frozen=True, eq=False)
+class ChangeTables:
+    """A difference on a device: `change` () layout.CHANGE, and the buffer `objects`, a uint for each."""
+
+    difference: Difference
+    change: npt.NDArray[np.void]
+    objects: cl.Buffer
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no path can meet any of it."""
+        return self.difference.is_empty
+
+
+def change_tables(device: Device, old: Scene, new: Scene) -> ChangeTables:
+    """The difference between two scenes for the paths of the new one. Raises DeviceError."""
+    found = difference(old, new)
+    flags = found.objects.astype(np.uint32)
+    return ChangeTables(
+        found, change_row(found), device.upload(flags if len(flags) else np.zeros(1, np.uint32))
+    )
+
+
+def difference(old: Scene, new: Scene) -> Difference:
+    """What differs between two scenes."""
+    change = diff(old, new)
+    placed = [
+        *_shown(old, _displaced(change) - change.added),
+        *_shown(new, _displaced(change) - change.removed),
+    ]
+    boxes = np.array([obj.world_bounds for obj in placed]).reshape(-1, 2, 3)
+    padding = _PADDING * max((_amplification(obj) for obj in placed), default=1.0)
+    return Difference(boxes, _with_other_materials(new, change), padding)
+
+
+def _displaced(change: Change) -> frozenset[str]:
+    """Objects that rays meet elsewhere than before."""
+    return change.added | change.removed | change.moved | change.deformed | change.reshaped
+
+
+def _shown(scene: Scene, names: frozenset[str]) -> list[Object]:
+    return [obj for obj in map(scene.object, sorted(names)) if obj.visible]
+
+
+def _with_other_materials(new: Scene, change: Change) -> npt.NDArray[np.bool_]:
+    changed = np.zeros(len(new.objects), np.bool_)
+    if change.materials:
+        changed[:] = [obj.material in change.materials for obj in new.objects]
+    changed[[new.object_index[name] for name in change.reassigned]] = True
+    return changed
+
+
+def _amplification(obj: Object) -> float:
+    """By how much the way into the space of an object and back enlarges rounding errors of a position."""
+    world, local = np.abs(obj.world_from_object[:, :3]), np.abs(affine.invert(obj.world_from_object)[:, :3])
+    return float(max((world @ local).sum(axis=1).max(), 1.0))
+
+
+def change_row(found: Difference) -> npt.NDArray[np.void]:
+    """() layout.CHANGE with at most layout.MOST_CHANGED_BOXES boxes that cover those of the difference."""
+    row = np.zeros((), layout.CHANGE)
+    row["has_objects"] = found.objects.any()
+    row["padding"] = found.padding
+    boxes = joined(found.boxes, layout.MOST_CHANGED_BOXES)
+    if len(boxes) % 2:
+        boxes = np.concatenate([boxes, boxes[-1:]])
+    row["box_count"] = len(boxes)
+    row["least"][: len(boxes)], row["greatest"][: len(boxes)] = boxes[:, 0], boxes[:, 1]
+    row["reach"] = np.abs(boxes).max(initial=0.0)
+    return row
+
+
+def joined(boxes: Boxes, most: int) -> Boxes:
+    """At most `most` boxes that cover `boxes` (N, 2, 3): two at a time become one, those first whose surface
+    grows least by it."""
+    if len(boxes) > _MOST_PAIRED:
+        boxes = _joined_by_place(boxes, _MOST_PAIRED)
+    while len(boxes) > most:
+        first, second = np.triu_indices(len(boxes), 1)
+        around = _around(boxes[first], boxes[second])
+        surface = _half_surface(boxes)
+        chosen = int((_half_surface(around) - surface[first] - surface[second]).argmin())
+        left = np.delete(boxes, (first[chosen], second[chosen]), axis=0)
+        boxes = np.concatenate([left, around[chosen][None]])
+    return boxes
+
+
+def _joined_by_place(boxes: Boxes, most: int) -> Boxes:
+    """Boxes that stand near each other become one: space is halved where most is between them."""
+    groups = [boxes]
+    while len(groups) < most:
+        extents = [np.ptp(group.mean(axis=1), axis=0) for group in groups]
+        several = [len(group) > 1 for group in groups]
+        widest = int(np.argmax(np.where(several, np.max(extents, axis=1), -1)))
+        group, axis = groups.pop(widest), int(extents[widest].argmax())
+        centers = group[:, :, axis].mean(axis=1)
+        lower = centers < (centers.min() + centers.max()) / 2
+        if not lower.any():  # all have the same place
+            lower[: len(group) // 2] = True
+        groups += [group[lower], group[~lower]]
+    return np.array([[group[:, 0].min(axis=0), group[:, 1].max(axis=0)] for group in groups])
+
+
+def _around(a: Boxes, b: Boxes) -> Boxes:
+    return np.stack([np.minimum(a[:, 0], b[:, 0]), np.maximum(a[:, 1], b[:, 1])], axis=1)
+
+
+def _half_surface(boxes: Boxes) -> npt.NDArray[np.float64]:
+    size = boxes[:, 1] - boxes[:, 0]
+    return np.asarray((size * np.roll(size, 1, axis=1)).sum(axis=1))
