@@ -198,6 +198,16 @@ FIRST_HITS = Group(
     ),
 )
 
+PARTNERS = Group(
+    "PARTNERS",
+    None,
+    (
+        Argument("partner_counts", "__global uint *", "of each work-item; or the sum of those before it"),
+        Argument("partner_place", "__global uint *", "of each path, see impact/partners.cl"),
+        Argument("partners", "__global uint *", "the places of the paths that have a partner"),
+    ),
+)
+
 TRACED = Group(
     "TRACED",
     None,
@@ -419,9 +429,9 @@ REFITTING = Group(
 
 GROUPS = (
     LAUNCH, SLOTS, PLACES, LIST, GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE, PATH_STATE, COMPACTION,
-    BLOCK_MEMORY, RADIANCE, CHANGES, FIRST_HITS, TRACED, REDUCTION, RESOLUTION, PICTURE, PAIRS, OLD_VALUES,
-    LABELS, NORMALS, GUIDES, COLUMNS, COLUMN_SUMS, CELLS, ACTIVITIES, SLOPES, SCALE, HALVES, SMOOTH_HALVES,
-    DETAILS, EVIDENCE, POOLED, SHOWN, SHOWN_IMAGE,
+    BLOCK_MEMORY, RADIANCE, CHANGES, PARTNERS, FIRST_HITS, TRACED, REDUCTION, RESOLUTION, PICTURE, PAIRS,
+    OLD_VALUES, LABELS, NORMALS, GUIDES, COLUMNS, COLUMN_SUMS, CELLS, ACTIVITIES, SLOPES, SCALE, HALVES,
+    SMOOTH_HALVES, DETAILS, EVIDENCE, POOLED, SHOWN, SHOWN_IMAGE,
     ITEMS, MESH, BOXES, CHUNKS, MEASURES, BINS, SIDES, MOVED, LEVEL, SPLITTING, LINKING, LEAVES, REFITTING,
 )  # fmt: skip
 """Every group."""
@@ -442,6 +452,8 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     "touch_rays": (LAUNCH, LIST, PATH_STATE, CHANGES),
     "touch_shadow_rays": (LAUNCH, LIST, PATH_STATE, CHANGES),
     "trace_blocks": (LAUNCH, SLOTS, PLACES, *BLOCK, RADIANCE, CHANGES),
+    "count_partners": (LAUNCH, SLOTS, PARTNERS),
+    "list_partners": (LAUNCH, SLOTS, PARTNERS),
     "first_hits": (LAUNCH, SHADING, PATH_STATE, FIRST_HITS),
     "reduce": (LAUNCH, SLOTS, TRACED, REDUCTION),
     "resolve": (RESOLUTION,),
@@ -474,6 +486,8 @@ KERNELS: dict[str, tuple[Group, ...]] = {
 FILES = {
     "touch_rays": "changes",
     "touch_shadow_rays": "changes",
+    "count_partners": "partners",
+    "list_partners": "partners",
     "cell_columns": "cell_statistics",
     "pool_cells": "cell_statistics",
     "mark_patches": "cell_statistics",

@@ -1,0 +1,362 @@
+"""Pairs of paths: what a path has to meet to bring something else in another scene, and its partner there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.pairs import check, session_of, traced_pairs
+from support.small_scenes import mixed_scene
+
+from incpt.benchmarks.kit.scenes import cornell, crowd, glass, icosphere, wavy_sphere
+from incpt.core import layout
+from incpt.core.settings import RenderSettings
+from incpt.device.device import Device
+from incpt.render.blocks import traces_in_blocks
+from incpt.render.impact.pairs import PairBuffers, PairTracer
+from incpt.scene.camera import Camera
+from incpt.scene.environment import Environment
+from incpt.scene.material import Material
+from incpt.scene.mesh import Mesh
+from incpt.scene.model import Object, Scene
+from incpt.scene.shapes import shape
+from incpt.tables.change_tables import change_tables
+from incpt.tables.scene_tables import tables_of
+
+_DEVICE = Device()
+SMALL = RenderSettings(size=(44, 28), tile_size=8, max_bounces=3)
+
+
+def sized(scene: Scene) -> Scene:
+    return replace(scene, settings=SMALL)
+
+
+def bent(mesh: Mesh) -> Mesh:
+    """The same faces with other vertices."""
+    vertices = mesh.vertices.copy()
+    vertices[:, 0] += 0.3 * vertices[:, 1]
+    return Mesh(vertices, mesh.faces, mesh.normals)
+
+
+def blocks_in_a_box() -> Scene:
+    """Everything is tested by brute force in blocks."""
+    return sized(cornell())
+
+
+def glass_cubes() -> Scene:
+    return sized(glass())
+
+
+def mixed() -> Scene:
+    """Image, lamp, media, meshes with trees."""
+    return sized(mixed_scene())
+
+
+def ball_in_a_box() -> Scene:
+    """A ball of 1,280 triangles, which has a tree, behind matt cubes without one."""
+    ball = Object("ball", wavy_sphere(3), "white", (0, 1.4, -0.4), scale=(0.7, 0.7, 0.7))
+    return sized(cornell().with_added(ball))
+
+
+def nested() -> Scene:
+    """Bodies of glass inside each other and overlapping, some that absorb, one of them rough."""
+    materials = {
+        "floor": Material((0.4, 0.5, 0.3), specular=0),
+        "outer": Material(
+            (1, 1, 1), roughness=0, transmission=1, ior=1.5, priority=2, absorption=(0.2, 0.1, 0)
+        ),
+        "inner": Material(
+            (1, 1, 1), roughness=0, transmission=1, ior=1.33, priority=1, absorption=(0, 0.9, 0.3)
+        ),
+        "frosted": Material((0.9, 1, 1), roughness=0.4, transmission=1, ior=1.4, priority=3),
+        "partly": Material((0.9, 0.2, 0.1), roughness=0.1, transmission=0.5, ior=1.6, priority=3),
+        "lamp": Material((0, 0, 0), emission=(9, 9, 8)),
+    }
+    cube = shape("cube")
+    objects = [
+        Object("floor", shape("plane"), "floor", scale=(9, 1, 9)),
+        Object("outer", cube, "outer", (0, 0.6, 0), (0, 20, 0), (1.2, 1.0, 1.2)),
+        Object("inner", cube, "inner", (0.2, 0.6, 0.1), (0, 50, 0), (0.7, 0.6, 0.7)),
+        Object("frosted", cube, "frosted", (-1.1, 0.4, 0.3), (0, 10, 0), (0.6, 0.6, 0.6)),
+        Object("partly", cube, "partly", (1.1, 0.5, 0.4), (0, -30, 0), (0.6, 0.7, 0.6)),
+        Object("stone", cube, "floor", (0.1, 0.5, 0.1), (0, 5, 20), (0.2, 0.2, 0.2)),
+        Object("lamp", shape("plane"), "lamp", (0, 3, 1), (180, 0, 0), (1.5, 1, 1.5)),
+    ]
+    camera = Camera((0, 1.3, 3.6), (0, 0.5, 0), fov_y=45)
+    return Scene(camera, Environment((0.3, 0.35, 0.4)), materials, tuple(objects), SMALL)
+
+
+@dataclass(frozen=True)
+class Edit:
+    """An edit of a scene, and the share of the paths that may meet it at most."""
+
+    name: str
+    scene: Callable[[], Scene]
+    apply: Callable[[Scene], Scene]
+    at_most: float = 1.0
+
+
+EDITS = [
+    Edit("move", mixed, lambda s: s.with_object("red cube", position=(0.15, 0.5, -0.1)), 0.35),
+    Edit("rotate", mixed, lambda s: s.with_object("red cube", rotation=(0, 75, 10)), 0.35),
+    Edit("scale", mixed, lambda s: s.with_object("grey drum", scale=(0.5, 0.9, 0.6)), 0.3),
+    Edit("recolour", mixed, lambda s: s.with_material("red", base_color=(0.1, 0.2, 0.7)), 0.25),
+    Edit("polish", mixed, lambda s: s.with_material("floor", roughness=0.2), 0.8),
+    Edit("delete", mixed, lambda s: s.without_object("grey drum"), 0.3),
+    Edit("hide", mixed, lambda s: s.with_object("glass ball", visible=False), 0.4),
+    Edit("show", lambda: mixed().with_object("red cube", visible=False),
+         lambda s: s.with_object("red cube", visible=True), 0.35),
+    Edit("add", mixed, lambda s: s.with_added(Object("new", shape("cube"), "grey", (0.4, 0.2, 1.2),
+                                                     scale=(0.3, 0.3, 0.3))), 0.3),
+    Edit("swap", mixed, lambda s: s.with_object("red cube", mesh=shape("cylinder")), 0.35),
+    Edit("deform", mixed, lambda s: s.with_object("glass ball", mesh=bent(shape("sphere"))), 0.45),
+    Edit("reassign", mixed, lambda s: s.with_object("red cube", material="grey"), 0.25),
+    Edit("glass", mixed, lambda s: s.with_object("glass ball", position=(0.9, 0.6, 0.2)), 0.45),
+    Edit("ior", mixed, lambda s: s.with_material("glass", ior=1.3), 0.4),
+    Edit("absorb", mixed, lambda s: s.with_material("glass", absorption=(0.1, 2.0, 0.2)), 0.4),
+    Edit("glass to metal", mixed, lambda s: s.with_object("glass ball", material="floor"), 0.4),
+    Edit("two", mixed, lambda s: s.with_object("red cube", position=(0.1, 0.5, 0.3)).with_material(
+        "grey", roughness=0.9), 0.5),
+    Edit("rename", mixed, lambda s: s.with_object("red cube", name="cube", position=(0.1, 0.5, 0)), 0.35),
+    Edit("block", blocks_in_a_box, lambda s: s.with_object("short", position=(0.3, 0.3, 0.4)), 0.5),
+    Edit("wall", blocks_in_a_box, lambda s: s.with_material("red", base_color=(0.1, 0.1, 0.6)), 0.5),
+    Edit("many", blocks_in_a_box, lambda s: s.without_object("tall").with_object(
+        "short", rotation=(10, 0, 5)).with_object("back", position=(0, 1, -0.9))),
+    Edit("ball", ball_in_a_box, lambda s: s.with_object("ball", position=(0.1, 1.4, -0.4)), 0.5),
+    Edit("ball bends", ball_in_a_box, lambda s: s.with_object("ball", mesh=bent(wavy_sphere(3))), 0.5),
+    Edit("cube", glass_cubes, lambda s: s.with_object("cube 6", position=(0.1, 0.31, 0)), 0.6),
+    Edit("tint", glass_cubes, lambda s: s.with_material("glass", base_color=(0.9, 1, 0.9))),
+    Edit("crowd", lambda: sized(crowd(300)), lambda s: s.with_object("150", position=(0.1, 0.3, 0.2)), 0.1),
+    Edit("inner", nested, lambda s: s.with_object("inner", position=(0.1, 0.65, 0.1)), 0.6),
+    Edit("inner, out", nested, lambda s: s.with_object("inner", position=(0.9, 0.65, 0.9)), 0.7),
+    Edit("priority", nested, lambda s: s.with_material("inner", priority=3), 0.5),
+    Edit("liquid", nested, lambda s: s.with_material("inner", absorption=(0.9, 0, 0), ior=1.2), 0.5),
+    Edit("other glass", nested, lambda s: s.with_object("inner", material="frosted"), 0.5),
+    Edit("stone", nested, lambda s: s.with_object("stone", rotation=(0, 40, 0)), 0.5),
+    Edit("frosted", nested, lambda s: s.with_material("frosted", roughness=0.6), 0.5),
+    Edit("partly", nested, lambda s: s.with_material("partly", transmission=0.8), 0.5),
+]  # fmt: skip
+
+
+@pytest.fixture(params=[False, True], ids=["wavefront", "blocks"])
+def in_blocks(request: pytest.FixtureRequest, device: Device) -> bool:
+    if request.param and not traces_in_blocks(device):
+        pytest.skip("no blocks on this device")
+    return bool(request.param)
+
+
+@pytest.mark.parametrize("edit", EDITS, ids=lambda edit: edit.name)
+def test_a_path_that_met_nothing_that_changed_brings_the_same(
+    edit: Edit, in_blocks: bool, device: Device
+) -> None:
+    old = edit.scene()
+    pairs = traced_pairs(device, old, edit.apply(old), in_blocks)
+    check(pairs, edit.at_most)
+    # Without the drum there are so few triangles that blocks test them by brute force.
+    assert pairs.same_kernels or edit.name == "delete"
+
+
+@pytest.mark.parametrize("edit", EDITS[:3], ids=lambda edit: edit.name)
+def test_undo_is_an_edit_too(edit: Edit, in_blocks: bool, device: Device) -> None:
+    old = edit.scene()
+    check(traced_pairs(device, edit.apply(old), old, in_blocks), edit.at_most)
+
+
+def test_blocks_and_wavefront_touch_the_same_paths(device: Device) -> None:
+    if not traces_in_blocks(device):
+        pytest.skip("no blocks on this device")
+    old = mixed()
+    for edit in ("move", "recolour", "glass"):
+        new = next(e for e in EDITS if e.name == edit).apply(old)
+        wavefront, blocks = (traced_pairs(device, old, new, tracer).touched for tracer in (False, True))
+        assert (wavefront != blocks).mean() < 1e-3
+        assert wavefront.any()
+
+
+def test_slots_without_partners(in_blocks: bool, device: Device) -> None:
+    """What paths of such slots met is told all the same."""
+    old = mixed()
+    new = EDITS[0].apply(old)
+    every = traced_pairs(device, old, new, in_blocks)
+    slot = np.arange(len(every.touched)) // SMALL.tile_size**2
+    single = np.arange(slot.max() + 1) % 3 == 1
+    some = traced_pairs(device, old, new, in_blocks, single=single)
+    check(some)
+    np.testing.assert_array_equal(some.touched, every.touched)
+    np.testing.assert_array_equal(some.partner_place == layout.NO_PARTNER, every.touched & single[slot])
+    assert 0 < len(some.partners) < len(every.partners)
+
+
+def test_equal_scenes_have_no_partners(in_blocks: bool, device: Device) -> None:
+    """Nor do scenes whose difference no path can meet."""
+    old = mixed()
+    unused = old.with_material("unused", base_color=(1, 0, 0), metallic=1.0)
+    for other in (old, mixed(), unused, old.with_object("red cube", visible=False)):
+        hidden = other.object("red cube").visible is False
+        new = other.with_object("red cube", position=(1, 1, 1)) if hidden else other
+        pairs = traced_pairs(device, other if hidden else old, new, in_blocks, spp=2)
+        check(pairs, at_most=0.0, differs=False)
+
+
+def far(scene: Scene, offset: tuple[float, float, float]) -> Scene:
+    """The scene somewhere else, seen from there."""
+    moved = tuple(
+        replace(obj, position=tuple(np.add(obj.position, offset).tolist())) for obj in scene.objects
+    )
+    camera = scene.camera
+    position, target = (tuple(np.add(v, offset).tolist()) for v in (camera.position, camera.target))
+    return replace(scene, objects=moved, camera=replace(camera, position=position, target=target))
+
+
+@pytest.mark.parametrize("make", [mixed, blocks_in_a_box, ball_in_a_box], ids=lambda make: make.__name__)
+def test_boxes_contain_rounding_errors_far_from_the_origin(
+    make: Callable[[], Scene], in_blocks: bool, device: Device
+) -> None:
+    """At 10 km a float is a millimetre wide. What is not padded is missed."""
+    old = far(make(), (8000, 100, -6000))
+    name = {"mixed": "red cube", "blocks_in_a_box": "short", "ball_in_a_box": "ball"}[make.__name__]
+    turned = old.with_object(name, rotation=(0, 90, 0))
+    new = turned.with_object(name, scale=tuple(0.9 * s for s in turned.object(name).scale))
+    check(traced_pairs(device, old, new, in_blocks, spp=64))
+
+
+def test_a_long_way_to_what_changed(in_blocks: bool, device: Device) -> None:
+    """Through a telescope, 10 km away: rays are as inexact as their way is long."""
+    old = mixed()
+    direction = np.subtract(old.camera.position, old.camera.target)
+    direction = 1e4 * direction / np.linalg.norm(direction)
+    camera = Camera(tuple(direction.tolist()), old.camera.target, fov_y=0.018)
+    old = replace(old, camera=camera)
+    for name in ("red cube", "grey drum"):
+        smaller = tuple(0.9 * s for s in old.object(name).scale)
+        check(traced_pairs(device, old, old.with_object(name, scale=smaller), in_blocks, spp=64))
+
+
+def test_more_changes_than_boxes(in_blocks: bool, device: Device) -> None:
+    old = sized(crowd(100))
+    new = old
+    for i in range(0, 100, 9):
+        obj = old.object(str(i))
+        new = new.with_object(
+            obj.name, rotation=(0, 10.0 * i, 20), position=tuple(np.add(obj.position, 0.02))
+        )
+    check(traced_pairs(device, old, new, in_blocks), at_most=0.9)
+
+
+def test_a_path_buffer_that_is_larger_than_the_pairs(device: Device) -> None:
+    session = session_of(device, mixed(), True)
+    batch = session._batch(session.progress.planned(10).slots, session._state.path_buffer)
+    changes = change_tables(device, mixed(), mixed())
+    buffers = PairBuffers.of(device, 64)
+    assert PairBuffers.of(device, 60, buffers) is buffers
+    assert PairBuffers.of(device, 65, buffers).stride == 65
+    with pytest.raises(AssertionError, match="room for each path"):
+        PairTracer(session._tracer).trace(batch, batch.tables, changes, buffers)
+
+
+def test_kernels_of_pairs_are_built_ahead(
+    in_blocks: bool, device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After the idle launches of pairs, an edit builds nothing, also with auxiliary images."""
+    own = Device()
+    old = mixed()
+    new = EDITS[0].apply(old)
+    session = session_of(own, replace(new, settings=replace(SMALL, aovs=True)), in_blocks)
+    batch = session._batch(session.progress.planned(session.grid.count).slots, session._state.path_buffer)
+    tables = tables_of(batch.tables.pool, old, batch.tables)
+    changes = change_tables(own, old, new)
+    buffers = PairBuffers.of(own, session._state.path_buffer.stride)
+    pair_tracer = PairTracer(session._tracer)
+    for launch in pair_tracer.idle_launches(batch, buffers):
+        launch()
+
+    def fail(*_: object) -> None:
+        raise AssertionError("a kernel is built while somebody waits")
+
+    monkeypatch.setattr(own, "build", fail)
+    assert pair_tracer.trace(batch, tables, changes, buffers) > 0
+
+
+_NUMBERS = st.floats(-1.0, 1.0, width=32)
+_PLACES = st.tuples(_NUMBERS, _NUMBERS, _NUMBERS)
+
+
+@st.composite
+def small_scenes(draw: st.DrawFn) -> Scene:
+    """A few bodies in the box, of which some are glass."""
+    scene = cornell().without_object("tall").without_object("short")
+    materials = {
+        **scene.materials,
+        "glass": Material(roughness=0.0, transmission=1.0, ior=1.5, absorption=(0.3, 0, 0.1), priority=1),
+        "fluid": Material(roughness=0.0, transmission=1.0, ior=1.3, priority=draw(st.integers(0, 2))),
+        "metal": Material(metallic=1.0, roughness=0.3),
+    }
+    bodies = []
+    for i in range(draw(st.integers(1, 4))):
+        x, y, z = draw(_PLACES)
+        bodies.append(
+            Object(
+                f"body {i}",
+                draw(st.sampled_from([shape("cube"), icosphere(1), wavy_sphere(3)])),
+                draw(st.sampled_from(["glass", "fluid", "metal", "white", "red"])),
+                (0.6 * x, 1 + 0.6 * y, 0.6 * z),
+                draw(st.tuples(*[st.integers(-90, 90)] * 3)),
+                (0.5 + 0.3 * draw(_NUMBERS), 0.4, 0.5),
+            )
+        )
+    settings = RenderSettings(size=(24, 24), tile_size=8, max_bounces=2)
+    return replace(scene, materials=materials, objects=(*scene.objects, *bodies), settings=settings)
+
+
+@st.composite
+def edits(draw: st.DrawFn) -> Callable[[Scene], Scene]:
+    """One of the things that people do to a scene."""
+    kind = draw(
+        st.sampled_from(["move", "turn", "hide", "remove", "copy", "assign", "colour", "swap", "wall"])
+    )
+    number, place = draw(st.integers(0, 3)), draw(_PLACES)
+    amount = draw(st.floats(0.05, 0.95))
+
+    def apply(scene: Scene) -> Scene:
+        bodies = [obj for obj in scene.objects if obj.name.startswith("body")]
+        if not bodies or kind == "wall":
+            return scene.with_object("left", position=(-1 - 0.2 * amount, 1, 0))
+        body = bodies[number % len(bodies)]
+        match kind:
+            case "move":
+                return scene.with_object(
+                    body.name, position=tuple(0.5 * p + (0, 1, 0)[i] for i, p in enumerate(place))
+                )
+            case "turn":
+                return scene.with_object(body.name, rotation=tuple(180 * p for p in place))
+            case "hide":
+                return scene.with_object(body.name, visible=not body.visible)
+            case "remove":
+                return scene.without_object(body.name)
+            case "copy":
+                copy = replace(body, name=f"body {len(scene.objects)}", position=(place[0], 1.2, place[2]))
+                return scene.with_added(copy)
+            case "assign":
+                return scene.with_object(body.name, material=("glass", "metal", "green")[number % 3])
+            case "colour":
+                return scene.with_material(body.material, base_color=(amount, 0.5, 1 - amount))
+            case _:
+                return scene.with_object(body.name, mesh=bent(body.mesh))
+
+    return apply
+
+
+@pytest.mark.slow
+@given(scene=small_scenes(), some=st.lists(edits(), min_size=1, max_size=4))
+@settings(max_examples=60)
+def test_any_edits_of_any_scene(scene: Scene, some: list[Callable[[Scene], Scene]]) -> None:
+    new = scene
+    for edit in some:
+        new = edit(new)
+    for in_blocks in (False, True):
+        pairs = traced_pairs(_DEVICE, scene, new, in_blocks and traces_in_blocks(_DEVICE), spp=8)
+        check(pairs, differs=bool(pairs.differ.any()))
