@@ -115,8 +115,8 @@ class EditBench:
         sums[:3] = np.moveaxis(image, 2, 0) * np.float32(self.base_spp)
         sums[3] = self.base_spp
         queue = Queue.even(tiles.base_queue(grid), settings.base_nor * settings.sample_rate, False)
-        tile_spp = np.full(grid.count, self.base_spp, np.int64)
-        progress = Progress(settings, grid, Mode.REFINE, queue, Cursor(), tile_spp)
+        drawn = np.full(grid.count, self.base_spp, np.int64)
+        progress = Progress(settings, grid, Mode.REFINE, queue, Cursor(), drawn, 0, np.zeros_like(drawn))
         return Snapshot(self.scene, progress, {RADIANCE.name: sums})
 
     def reference(self, scene: Scene, settings: RenderSettings, note: Note) -> FloatImage:

@@ -9,7 +9,7 @@ from typing import Any
 from incpt.core.checks import described, one_of, require_bool, whole
 from incpt.core.errors import InputError
 
-STRATEGIES = ("restart", "spiral")
+STRATEGIES = ("restart", "spiral", "impact")
 """Names of the strategies of `incpt.render.strategies`, so that scenes can be read without a device."""
 POINTS_OF_CHANGE = ("bounds", "pixel")
 MAX_IMAGE_PIXELS = 1 << 26

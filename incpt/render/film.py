@@ -125,6 +125,10 @@ class Film:
         film._planes = {one: self._planes.get(one) or self._zeroed(one) for one in planes}
         return film
 
+    def has_planes(self, planes: tuple[FilmPlanes, ...]) -> bool:
+        """Whether it keeps all of them."""
+        return set(planes) <= set(self._planes)
+
     def planes(self, planes: FilmPlanes) -> cl.Buffer:
         """Planes that the film keeps, of width x height floats each."""
         return self._planes[planes]
@@ -145,9 +149,9 @@ class Film:
         samples: cl.Buffer,
         passes: tuple[FilmPass, ...] | None = None,
     ) -> None:
-        """Put the paths of a step into `passes` of the film (None: all): `samples` holds what they brought, in
-        the order of `slots`, a plane of params["buffer_stride"] floats for each channel of each pass. Slots
-        with gaps are left out, because no pass counts the pixels of a tile apart."""
+        """Put the paths of a step into `passes` of the film (None: all): `samples` holds what they brought,
+        in the order of `slots`, a plane of params["buffer_stride"] floats for each channel of each pass.
+        Slots with gaps are left out, because no pass counts the pixels of a tile apart."""
         whole_tiles = plan.slots[plan.slots["pixel_step"] == 1]
         groups = np.unique(whole_tiles["group_first"]).astype(np.uint32)
         if len(groups) == 0:
@@ -200,8 +204,8 @@ class Film:
         return self.device.read(layer.image, image)
 
     def sums(self) -> dict[str, Float32Array]:
-        """(channels + 1, height, width) of each pass: the sums of its channels, and the number of samples; and
-        the planes that are kept beside them."""
+        """(channels + 1, height, width) of each pass: the sums of its channels, and the number of samples;
+        and the planes that are kept beside them."""
         found = {}
         for name, layer in self._layers.items():
             planes = np.empty((layer.film_pass.channels + 1, self.height, self.width), np.float32)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pyopencl as cl
 
@@ -12,6 +12,7 @@ from incpt.core.errors import DeviceError, InputError
 from incpt.core.settings import RenderSettings
 from incpt.device.device import Device
 from incpt.render.film import plane_count
+from incpt.render.impact.pairs import PairBuffers
 from incpt.render.strategies import passes_of
 from incpt.render.tiles import TileGrid
 
@@ -22,11 +23,13 @@ _MOST_FLOATS = 1 << 32
 @dataclass(frozen=True, eq=False)
 class PathBuffer:
     """Memory for the paths of a step: `planes` planes of `stride` floats each. A plane has a place for each
-    path, slot by slot, and at its end room where idle lanes may write."""
+    path, slot by slot, and at its end room where idle lanes may write. `pairs` has room for the partners of
+    all paths, once a strategy has asked for it."""
 
     floats: cl.Buffer
     planes: int
     stride: int
+    pairs: PairBuffers | None = None
 
     @classmethod
     def of_settings(cls, device: Device, settings: RenderSettings, old: PathBuffer | None) -> PathBuffer:
@@ -47,6 +50,11 @@ class PathBuffer:
             with suppress(DeviceError):
                 return self._made(device, self.planes, min(2 * stride, most))
         return self
+
+    def with_pairs(self, device: Device) -> PathBuffer:
+        """The same with room for pairs. Raises DeviceError where memory runs out."""
+        pairs = PairBuffers.of(device, self.stride, self.pairs)
+        return self if pairs is self.pairs else replace(self, pairs=pairs)
 
     def room(self, tile_size: int) -> int:
         """The slots that it has room for."""

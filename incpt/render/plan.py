@@ -41,9 +41,10 @@ class Queue:
     samples   (N,) paths per pixel of each of them, one at least. Each path per pixel fills a slot.
     replaces  whether a finished tile replaces what the film has of it, with samples counted from 0 (BASE,
               INCREMENTAL), or is added to it and counts on from there (REFINE).
-    subsets   (N,) None: all entries are whole tiles, as those with -1 are. An entry with a number from 0 to 15
-              is sparse: of each square of 4 x 4 pixels it takes the one with that number, row by row, over the
-              4 x 4 tiles from its tile on. It has one sample, with the index before the first one of tiles.
+    subsets   (N,) None: all entries are whole tiles, as those with -1 are. An entry with a number from 0 to
+              15 is sparse: of each square of 4 x 4 pixels it takes the one with that number, row by row, over
+              the 4 x 4 tiles from its tile on. It has one sample, with the index before the first one of
+              tiles.
     singles   (N,) whether the paths of an entry have no partners in the scene before the edit; None: no
               entry's have.
     worth     (grid.count,) samples of the scene as it is now that each tile is worth, where that is not how
@@ -106,9 +107,9 @@ def plan_step(
 
     `sample_counts` (grid.count,) is how many samples were drawn of each tile; it must not change while a tile
     is under way. The first of them had the index `first_sample`. The repetitions of a tile in this step
-    form a group of neighbouring slots with consecutive sample indices. Where a tile has more samples than there are
-    slots, its groups follow in the next steps: FIRST marks the group that starts the tile, LAST the one that
-    completes it.
+    form a group of neighbouring slots with consecutive sample indices. Where a tile has more samples than
+    there are slots, its groups follow in the next steps: FIRST marks the group that starts the tile, LAST the
+    one that completes it.
     """
     begin = queue.slots_before(cursor)
     end = min(begin + slot_count, queue.slot_count)

@@ -7,13 +7,16 @@ has. A session carries out what follows from it.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from incpt.core.settings import PICTURE_SETTINGS, RenderSettings
+from incpt.render.impact.anchor import Anchor
 from incpt.render.modes import Event, Mode, next_mode
 from incpt.render.plan import CountArray, Cursor, Plan, Queue, counts_after, is_done, plan_step
-from incpt.render.strategies import FilmSums, Situation, strategy_of
+from incpt.render.strategies import strategy_of
+from incpt.render.strategy import Measurements, Situation
 from incpt.render.tiles import IntArray, TileGrid
 from incpt.scene.change import Change, affected_objects, diff
 from incpt.scene.model import Object, Scene
@@ -23,13 +26,15 @@ from incpt.scene.model import Object, Scene
 class Progress:
     """Where the rendering of a scene stands.
 
-    grid      the tiles of the picture.
-    mode      what is being done.
-    queue     the tiles that the mode goes through, in order.
-    cursor    how far the queue is done.
-    tile_spp  (grid.count,) samples of the scene as it is now behind each tile; 0 where the film still shows
-              an old picture, or none. Nobody can write to it any more. See `Film` for the count that it keeps
-              itself.
+    grid          the tiles of the picture.
+    mode          what is being done.
+    queue         the tiles that the mode goes through, in order.
+    cursor        how far the queue is done.
+    drawn         (grid.count,) samples drawn of each tile, from the one with the index `first_sample` on.
+    first_sample  that index. It goes up where the samples before stay in the picture and must not come twice.
+    kept          (grid.count,) samples behind each tile beside those drawn.
+    anchor        the scene that this one is compared with, whose picture the film's radiance is; None: it is
+                  that of this scene.
     """
 
     settings: RenderSettings
@@ -37,27 +42,42 @@ class Progress:
     mode: Mode
     queue: Queue
     cursor: Cursor
-    tile_spp: CountArray
+    drawn: CountArray
+    first_sample: int
+    kept: CountArray
+    anchor: Anchor | None = None
 
-    def __post_init__(self) -> None:
-        self.tile_spp.flags.writeable = False
+    @cached_property
+    def tile_spp(self) -> CountArray:
+        """(grid.count,) samples of the scene as it is now that each tile is worth; 0 where the film still
+        shows an old picture, or none. Nobody can write to it. See `Film` for the count that it keeps
+        itself."""
+        if self.queue.worth is not None:
+            return self.queue.worth
+        counts = self.drawn + self.kept
+        counts.flags.writeable = False
+        return counts
 
     @classmethod
-    def start(cls, settings: RenderSettings, scene: Scene, film: FilmSums) -> Progress:
+    def start(cls, settings: RenderSettings, scene: Scene, film: Measurements) -> Progress:
         """Nothing is rendered yet."""
         grid = TileGrid(*settings.size, settings.tile_size)
-        tile_spp = np.zeros(grid.count, np.int64)
-        situation = Situation(Mode.BASE, settings, grid, scene, tile_spp, film)
+        none = np.zeros(grid.count, np.int64)
+        situation = Situation(Mode.BASE, settings, grid, scene, none, film)
         queue = strategy_of(settings).queue(situation)
-        return cls(settings, grid, Mode.BASE, queue, Cursor(), tile_spp)
+        return cls(settings, grid, Mode.BASE, queue, Cursor(), drawn=none, first_sample=0, kept=none)
 
     def planned(self, slot_count: int) -> Plan:
         """The next step, of so many slots at most."""
-        return plan_step(self.grid, self.queue, self.cursor, slot_count, self.tile_spp)
+        return plan_step(self.grid, self.queue, self.cursor, slot_count, self.drawn, self.first_sample)
 
-    def after_step(self, plan: Plan, scene: Scene, film: FilmSums) -> Progress:
+    def after_step(self, plan: Plan, scene: Scene, film: Measurements) -> Progress:
         """What follows once `plan` is in the film; at the end of the queue, with the next one."""
-        stepped = replace(self, cursor=plan.cursor, tile_spp=counts_after(self.queue, plan, self.tile_spp))
+        drawn, kept = counts_after(self.queue, plan, self.drawn), self.kept
+        if self.queue.replaces and kept.any():
+            kept = kept.copy()
+            kept[plan.finished] = 0
+        stepped = replace(self, cursor=plan.cursor, drawn=drawn, kept=kept)
         if not is_done(self.queue, plan.cursor):
             return stepped
         return stepped.entering(stepped._next_mode(Event.QUEUE_DONE), scene, film)
@@ -67,7 +87,7 @@ class Progress:
         old: Scene,
         scene: Scene,
         change: Change,
-        film: FilmSums,
+        film: Measurements,
         since: Scene | None = None,
         pixel: tuple[float, float] | None = None,
     ) -> Progress:
@@ -78,26 +98,59 @@ class Progress:
         changed = affected_objects(old, scene, change)
         if not changed:
             return self
+        mode = self._next_mode(Event.LOCAL_CHANGE)
+        if mode is Mode.INCREMENTAL and strategy_of(self.settings).keeps_anchor:
+            return self._compared(old, scene, film, pixel)
         affected = (_affected_locally(since, scene) if since is not None else ()) or tuple(changed)
-        return self.entering(self._next_mode(Event.LOCAL_CHANGE), scene, film, affected, pixel)
+        return self.entering(mode, scene, film, affected, pixel)
+
+    def _compared(
+        self, old: Scene, scene: Scene, film: Measurements, pixel: tuple[float, float] | None
+    ) -> Progress:
+        """What follows from a local edit of `old` where `scene` is compared with an anchor."""
+        anchor = self.anchor
+        if anchor is None or not (self.is_untouched or anchor.serves(old, scene)):
+            anchor = Anchor(old, self.tile_spp)
+        affected = anchor.affected(scene)
+        none = np.zeros_like(self.drawn)
+        # Index first_sample - 1 is that of an exploration.
+        other = replace(
+            self, first_sample=self.first_sample + int(self.drawn.max()) + 1, drawn=none, kept=none
+        )
+        if not affected:  # The scene is that of the anchor again, and its picture is there.
+            other = replace(other, kept=anchor.worth, anchor=None)
+            return other.entering(Mode.REFINE, scene, film)
+        return replace(other, anchor=anchor).entering(Mode.INCREMENTAL, scene, film, affected, pixel)
+
+    @property
+    def is_untouched(self) -> bool:
+        """Whether nothing was rendered of the queue after an edit."""
+        return self.mode is Mode.INCREMENTAL and self.cursor == Cursor()
 
     def after_drag(
-        self, since: Scene, scene: Scene, film: FilmSums, pixel: tuple[float, float] | None = None
+        self, since: Scene, scene: Scene, film: Measurements, pixel: tuple[float, float] | None = None
     ) -> Progress:
         """What follows from the end of a drag that made `scene` of `since`; see `Session.end_drag`."""
+        if self.anchor is not None:  # Steps of the drag are worth as much as those after it.
+            return self
         affected = _affected_locally(since, scene)
         mode = self._next_mode(Event.LOCAL_CHANGE)
         if mode is not Mode.INCREMENTAL or not affected:
             return self
         return self.entering(mode, scene, film, affected, pixel)
 
-    def with_settings(self, settings: RenderSettings, scene: Scene, film: FilmSums) -> Progress:
+    def with_settings(self, settings: RenderSettings, scene: Scene, film: Measurements) -> Progress:
         """The same picture under other settings for the same grid. It starts over where samples change their
         meaning; a queue that has not begun gets the samples that the settings now ask for."""
         old, other = self.settings, replace(self, settings=settings)
+        if self.anchor is not None and not strategy_of(settings).keeps_anchor:
+            none = np.zeros_like(self.drawn)
+            first = self.first_sample + int(self.drawn.max())
+            other = replace(other, anchor=None, kept=self.tile_spp, drawn=none, first_sample=first)
+            other = other.entering(Mode.REFINE, scene, film)
         if any(getattr(old, name) != getattr(settings, name) for name in PICTURE_SETTINGS):
             return other.entering(Mode.BASE, scene, film)
-        if self.cursor == Cursor():
+        if self.cursor == Cursor() and other.anchor is None:
             return other.entering(self.mode, scene, film, order=self.queue.tiles)
         return other
 
@@ -105,19 +158,32 @@ class Progress:
         self,
         mode: Mode,
         scene: Scene,
-        film: FilmSums,
+        film: Measurements,
         affected: tuple[Object, ...] = (),
         pixel: tuple[float, float] | None = None,
         order: IntArray | None = None,
     ) -> Progress:
         """The beginning of a mode, with the queue that the strategy plans for it; `order` keeps an order that
         is there already."""
-        tile_spp = np.zeros_like(self.tile_spp) if mode is Mode.BASE else self.tile_spp
+        begun = self
+        if mode is Mode.BASE:
+            none = np.zeros_like(self.drawn)
+            begun = replace(self, drawn=none, first_sample=0, kept=none, anchor=None)
         situation = Situation(
-            mode, self.settings, self.grid, scene, tile_spp, film, affected, pixel, self.queue
+            mode,
+            self.settings,
+            self.grid,
+            scene,
+            begun.drawn + begun.kept,
+            film,
+            affected,
+            pixel,
+            self.queue,
+            begun.drawn,
+            begun.anchor is not None,
         )
         queue = strategy_of(self.settings).queue(situation, order)
-        return replace(self, mode=mode, queue=queue, cursor=Cursor(), tile_spp=tile_spp)
+        return replace(begun, mode=mode, queue=queue, cursor=Cursor())
 
     def _next_mode(self, event: Event) -> Mode:
         return next_mode(self.mode, event, strategy_of(self.settings))

@@ -23,12 +23,15 @@ from incpt.render import first_hits, tiles
 from incpt.render.batch import Batch
 from incpt.render.film import RADIANCE, Film, tile_image
 from incpt.render.first_hits import FirstHits
+from incpt.render.impact.comparison import Comparison, compared
+from incpt.render.impact.tile_sums import TileSums
 from incpt.render.modes import Mode
 from incpt.render.params import path_params
 from incpt.render.path_buffer import PathBuffer, slots_of
 from incpt.render.plan import Cursor, Queue
 from incpt.render.progress import Progress
-from incpt.render.strategies import TracedStep, passes_of, strategy_of
+from incpt.render.strategies import passes_of, strategy_of
+from incpt.render.strategy import Step
 from incpt.render.tracer import tracer_of
 from incpt.scene.change import Change, diff
 from incpt.scene.model import Scene
@@ -41,8 +44,8 @@ _PIXEL = "a pixel (x, y)"
 @dataclass(frozen=True)
 class StepReport:
     """What a step did: its mode, the tiles it finished, the place in the queue after it (in tiles), the
-    paths it traced (those past the image's edge included), its duration in seconds, and how many samples were
-    not finite (they count as black)."""
+    paths it traced of the scene as it is now (those past the image's edge included), its duration in seconds,
+    how many samples were not finite (they count as black), and whether the picture shows anything of it."""
 
     mode: Mode
     tiles: npt.NDArray[np.int32]
@@ -51,6 +54,22 @@ class StepReport:
     paths: int
     seconds: float
     nonfinite: int
+    is_shown: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What strategies may read of a film, and of the scene that it is compared with; see
+    `strategy.Measurements`."""
+
+    film: Film
+    comparison: Comparison | None = None
+
+    def sums(self) -> Mapping[str, npt.NDArray[np.float32]]:
+        return self.film.sums()
+
+    def tile_sums(self) -> TileSums | None:
+        return None if self.comparison is None else self.comparison.tile_sums(self.film)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +81,12 @@ class SessionState:
     film: Film
     path_buffer: PathBuffer
     tables: SceneTables
+    comparison: Comparison | None = None
+
+    @property
+    def measured(self) -> Measured:
+        """What strategies may read of it."""
+        return Measured(self.film, self.comparison)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +123,7 @@ class Session:
         tables = tables_of(GeometryPool.of(self.device), scene)
         film = _new_film(self.device, settings)
         path_buffer = PathBuffer.of_settings(self.device, settings, None)
-        self._state = SessionState(Progress.start(settings, scene, film), film, path_buffer, tables)
+        self._state = SessionState(Progress.start(settings, scene, Measured(film)), film, path_buffer, tables)
 
     @property
     def scene(self) -> Scene:
@@ -154,16 +179,26 @@ class Session:
             path_buffer = path_buffer.grown(self.device, slots, settings.tile_size)
             slots = max(1, min(slots, path_buffer.room(settings.tile_size)))
         plan = before.planned(slots_of(settings) if slots is None else slots)
+        comparison = self._state.comparison
+        path_buffer = path_buffer if comparison is None else path_buffer.with_pairs(self.device)
         batch = self._batch(plan.slots, path_buffer)
-        self._tracer.trace(batch)
-        strategy_of(settings).merge(TracedStep(self._tracer, batch, plan), film)
+        step = Step(self._tracer, batch, plan, comparison, path_buffer.pairs)
+        strategy_of(settings).render(step, film)
         nonfinite = film.take_nonfinite()
-        self._state = replace(
-            self._state, progress=before.after_step(plan, self.scene, film), path_buffer=path_buffer
-        )
+        progress = before.after_step(plan, self.scene, self._state.measured)
+        self._state = replace(self._state, progress=progress, path_buffer=path_buffer)
         seconds = time.perf_counter() - start
         done, length = plan.cursor.tiles, len(before.queue.tiles)
-        return StepReport(before.mode, plan.finished, done, length, batch.path_count, seconds, nonfinite)
+        return StepReport(
+            mode=before.mode,
+            tiles=plan.finished,
+            queue_done=done,
+            queue_length=length,
+            paths=batch.path_count,
+            seconds=seconds,
+            nonfinite=nonfinite,
+            is_shown=comparison is not None or len(plan.finished) > 0,
+        )
 
     def edit(
         self,
@@ -184,8 +219,8 @@ class Session:
         pixel = _point(pixel)
         state = self._state if settings is None else self._configured(settings)
         change = diff(self.scene, scene)
-        progress = state.progress.after_edit(self.scene, scene, change, state.film, since, pixel)
-        self._state = replace(state, progress=progress, tables=self._tables_of(scene))
+        progress = state.progress.after_edit(self.scene, scene, change, state.measured, since, pixel)
+        self._state = self._brought(state, progress, scene)
         return change
 
     def end_drag(self, since: Scene, pixel: tuple[float, float] | None = None) -> None:
@@ -193,13 +228,13 @@ class Session:
         often as the strategy and the settings say by now. Nothing happens where the picture started over.
         `pixel` is that of `edit`."""
         require("since", since, Scene, "a Scene")
-        progress = self.progress.after_drag(since, self.scene, self._state.film, _point(pixel))
-        self._state = replace(self._state, progress=progress)
+        progress = self.progress.after_drag(since, self.scene, self._state.measured, _point(pixel))
+        self._state = self._brought(self._state, progress, self.scene)
 
     def restart(self) -> None:
         """Throw away what was accumulated; the picture stands until it is rendered anew."""
-        progress = self.progress.entering(Mode.BASE, self.scene, self._state.film)
-        self._state = replace(self._state, progress=progress)
+        progress = self.progress.entering(Mode.BASE, self.scene, self._state.measured)
+        self._state = self._brought(self._state, progress, self.scene)
 
     def configure(self, settings: RenderSettings) -> None:
         """Render with other settings from now on. The picture starts over only if samples change meaning.
@@ -224,17 +259,19 @@ class Session:
         everything stays as it was."""
         require("snapshot", snapshot, Snapshot, "a Snapshot; Session.snapshot makes one")
         settings, cursor = snapshot.progress.settings, Cursor(snapshot.progress.cursor.tiles)
-        film = _new_film(self.device, settings)
+        planes = strategy_of(settings).planes if snapshot.progress.anchor is not None else ()
+        film = _new_film(self.device, settings).with_planes(planes)
         film.restore(snapshot.sums)
         path_buffer = PathBuffer.of_settings(self.device, settings, self._state.path_buffer)
         progress = replace(snapshot.progress, cursor=cursor)
-        self._state = SessionState(progress, film, path_buffer, self._tables_of(snapshot.scene))
+        tables, comparison = self._tables_for(progress, snapshot.scene, None)
+        self._state = SessionState(progress, film, path_buffer, tables, comparison)
 
     def image(self, alpha: bool = False) -> npt.NDArray[np.float32]:
         """(H, W, 3) mean radiance, linear; row 0 is on top. What is not rendered anew yet shows the old
         picture, at first black. With `alpha` (H, W, 4): 0 where there was never a picture of this size."""
         require_bool("alpha", alpha)
-        image = strategy_of(self.settings).image(self._state.film)
+        image = strategy_of(self.settings).image(self._state.film, self._state.comparison)
         return image if alpha else np.ascontiguousarray(image[..., :3])
 
     def pass_image(self, name: str) -> npt.NDArray[np.float32]:
@@ -289,13 +326,14 @@ class Session:
         `on_progress` is called with how many of how many steps are done; not at all if nothing is to do.
         What it raises ends the building, which may go on later."""
         require_call("on_progress", on_progress)
-        kernels = (*self._tables.variant, *map(str, passes_of(self.settings)))
+        kernels = (*self._tables.variant, *map(str, passes_of(self.settings)), self.settings.strategy)
         if kernels in self.device.built:
             return
         batch = self._batch(first_hits.one_slot(), self._state.path_buffer)
         steps = [
             *self._tracer.idle_launches(batch),
             *self._state.film.idle_launches(batch.params, batch.path_buffer),
+            *strategy_of(self.settings).idle_launches(self._tracer, batch, self._state.film),
         ]
         for done, step in enumerate(steps, 1):
             step()
@@ -308,9 +346,31 @@ class Session:
     def _tables(self) -> SceneTables:
         return self._state.tables
 
-    def _tables_of(self, scene: Scene) -> SceneTables:
-        """The tables of another scene, which share what they can with those of this one."""
-        return tables_of(self._tables.pool, scene, self._tables)
+    def _brought(self, state: SessionState, progress: Progress, scene: Scene) -> SessionState:
+        """`state` after an edit that leads to `progress`. What can fail comes before the film changes."""
+        tables, comparison = self._tables_for(progress, scene, state.comparison)
+        before, strategy = state.progress, strategy_of(progress.settings)
+        # Memory for pairs is made with the first edit, since many pictures never see one.
+        is_needed = progress.anchor is not None or state.film.has_planes(strategy.planes)
+        film = state.film.with_planes(strategy.planes if is_needed else ())
+        # Where the scene is that of the anchor again, the anchor's picture is better than the one found.
+        anchor = before.anchor if progress.anchor is not before.anchor else None
+        if anchor is not None and state.comparison is not None and anchor.affected(scene):
+            strategy_of(before.settings).fold(state.film, state.comparison)
+        if progress.anchor is not None and progress.first_sample != before.first_sample:
+            strategy.begin(film)
+        return replace(state, progress=progress, film=film, tables=tables, comparison=comparison)
+
+    def _tables_for(
+        self, progress: Progress, scene: Scene, before: Comparison | None
+    ) -> tuple[SceneTables, Comparison | None]:
+        """The tables of a scene, which share what they can with those of this one, and what compares it with
+        its anchor; `before`: what compared the scene before it."""
+        pool = self._tables.pool
+        if progress.anchor is None:
+            return tables_of(pool, scene, self._tables), None
+        comparison = compared(self._tracer, progress.settings, progress.anchor, scene, self._tables, before)
+        return comparison.tables, comparison
 
     def _configured(self, settings: RenderSettings) -> SessionState:
         """The state under other settings."""
@@ -324,9 +384,12 @@ class Session:
         passes = passes_of(settings)
         if (old.size, old.tile_size, state.film.passes) != (settings.size, settings.tile_size, passes):
             film = _new_film(self.device, settings)
-            return SessionState(Progress.start(settings, self.scene, film), film, path_buffer, state.tables)
-        progress = state.progress.with_settings(settings, self.scene, state.film)
-        return SessionState(progress, state.film, path_buffer, state.tables)
+            tables = tables_of(self._tables.pool, self.scene, self._tables)
+            return SessionState(
+                Progress.start(settings, self.scene, Measured(film)), film, path_buffer, tables
+            )
+        progress = state.progress.with_settings(settings, self.scene, state.measured)
+        return replace(self._brought(state, progress, self.scene), path_buffer=path_buffer)
 
     def _batch(self, slots: npt.NDArray[np.void], path_buffer: PathBuffer) -> Batch:
         """All paths of these slots (layout.SLOT), in the scene as it is now."""

@@ -370,8 +370,10 @@ def followed(side: Side, work: Follow, progress: Progress, now: float) -> Side:
     full_view = work.view if work.divisor == 1 else side.full_view
     side = replace(side, view=work.view, divisor=work.divisor, full_view=full_view, progress=progress)
     begins = progress.queue is not before.queue and progress.mode is not Mode.REFINE
-    if begins or progress.grid != before.grid:
-        side = replace(restarted(side, progress), changed_at=now)
+    # Where an edit is taken back, the picture of the scene before it is there at once.
+    returns = progress.anchor is not before.anchor and progress.mode is Mode.REFINE
+    if begins or returns or progress.grid != before.grid:
+        side = replace(restarted(side, progress), changed_at=now, is_answered=returns)
     if work.view.before is None and was_dragged:
         side = replace(side, changed_at=-math.inf)
     return side
@@ -403,7 +405,7 @@ def stepped(side: Side, report: StepReport, seconds: float, progress: Progress) 
     if is_first_pass:
         pass_paths, pass_seconds = pass_paths + report.paths, pass_seconds + seconds
         whole = whole.after(pass_paths, pass_seconds) if is_whole else whole
-    if len(report.tiles):
+    if report.is_shown:
         version += 1
         if not is_answered and (is_whole or not is_first_pass):
             is_answered, urgent = True, version

@@ -206,10 +206,10 @@ def test_sweep_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture
     command += ["--at-step", "1", "--at-step", "3", "--at-second", "0.05", "--repetitions", "2"]
     assert main.main(command) == 0
     printed = capsys.readouterr()
-    assert "turn" in printed.out and "spiral" in printed.out
+    assert "turn" in printed.out and "spiral" in printed.out and "impact" in printed.out
     assert not any(line.startswith("turn: tile 8") for line in printed.out.splitlines())
     found = read(tmp_path / "out" / "sweep.jsonl")
-    assert len(found.records) == 4
+    assert len(found.records) == 6
     for record in found.records:
         marks = {row["mark"] for row in record.rows}
         assert marks == {"1 steps", "3 steps", "0.05 s"} | (

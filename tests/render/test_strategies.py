@@ -18,12 +18,10 @@ from incpt.render.session import Session
 from incpt.render.strategies import (
     RESTART,
     STRATEGIES_BY_NAME,
-    Situation,
-    Strategy,
-    TracedStep,
     point_of_change,
     strategy_of,
 )
+from incpt.render.strategy import Situation, Step, Strategy
 from incpt.render.tiles import IntArray, TileGrid, base_queue, spiral_queue
 
 SETTINGS = RenderSettings(size=(44, 28), tile_size=8, nor=5, base_nor=2, sample_rate=3)
@@ -35,6 +33,9 @@ class NoFilm:
     """No strategy that stands here reads the film."""
 
     def sums(self) -> NoReturn:
+        raise AssertionError("the film is read")
+
+    def tile_sums(self) -> NoReturn:
         raise AssertionError("the film is read")
 
 
@@ -49,7 +50,7 @@ def test_settings_know_the_strategies_that_there_are() -> None:
         assert strategy.name == name and strategy_of(replace(SETTINGS, strategy=name)) is strategy
 
 
-@pytest.mark.parametrize("strategy", [RESTART, SPIRAL])
+@pytest.mark.parametrize("strategy", [RESTART, SPIRAL, STRATEGIES_BY_NAME["impact"]])
 @pytest.mark.parametrize("mode", [Mode.BASE, Mode.REFINE])
 def test_base_and_refinement_go_row_by_row(strategy, mode: Mode) -> None:
     queue = strategy.queue(situation(mode))
@@ -106,11 +107,11 @@ class Probe(Strategy):
         count = situation.film.sums()["traces"][1]
         return 1 + order % 3 + int(count.max())
 
-    def merge(self, step: TracedStep, film: Film) -> None:
-        batch, stride = step.batch, int(step.batch.params["buffer_stride"])
+    def render(self, step: Step, film: Film) -> None:
+        stride = int(step.batch.params["buffer_stride"])
         place = 4 * film.first_plane("traces") * stride
-        film.device.write(batch.path_buffer, np.full(stride, 2.0, np.float32), offset=place)
-        super().merge(step, film)
+        film.device.write(step.batch.path_buffer, np.full(stride, 2.0, np.float32), offset=place)
+        super().render(step, film)
 
 
 @pytest.mark.parametrize("aovs", [False, True])

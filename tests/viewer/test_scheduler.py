@@ -58,7 +58,7 @@ def side_of(
     """A side that shows `view` in a mode, whose last change is answered long ago."""
     settings = scheduler.settings_of(view, strategy, pace, divisor)
     progress = Progress.start(settings, view.scene, NoFilm()).entering(mode, view.scene, NoFilm())
-    progress = replace(progress, tile_spp=np.full(progress.grid.count, spp, np.int64))
+    progress = replace(progress, drawn=np.full(progress.grid.count, spp, np.int64))
     side = Side.opened(view, progress, pace, divisor, strategy)
     return replace(side, is_answered=True, changed_at=NOW - 10)
 
@@ -69,7 +69,9 @@ def state(view: View, *sides: Side, spent: tuple[float, ...] | None = None, now:
 
 def report_of(side: Side, tiles: list[int], done: int, paths: int = 64) -> StepReport:
     length = len(side.progress.queue.tiles)
-    return StepReport(side.progress.mode, np.array(tiles, np.int32), done, length, paths, 0.0, 0)
+    return StepReport(
+        side.progress.mode, np.array(tiles, np.int32), done, length, paths, 0.0, 0, is_shown=len(tiles) > 0
+    )
 
 
 # ------------------------------------------------------------------------------------------------- edits
@@ -232,7 +234,7 @@ def test_both_sides_get_the_same_time_and_an_answer_comes_first() -> None:
     assert turn(unanswered, (1.0, 1.01)).side == 1
     assert turn(unanswered, (1.0, 1.03)).side == 0
     # A side with nothing to do does not save up time.
-    done = replace(main, progress=replace(main.progress, tile_spp=main.progress.tile_spp + 5))
+    done = replace(main, progress=replace(main.progress, drawn=main.progress.drawn + 5))
     target = replace(view, target_spp=6)
     assert turn(done, (2.0, 1.0), target) == Step(0, turn(done, (2.0, 1.0), target).slots, (2.0, 2.0))
     assert turn(main, (2.0, 1.0)).spent == (2.0, 1.0)

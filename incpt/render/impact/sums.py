@@ -32,9 +32,14 @@ class OldValues(Protocol):
     partner_radiance  what partners brought: red, green and blue, planes of `stride` floats.
     """
 
-    partner_place: cl.Buffer
-    partner_radiance: cl.Buffer
-    stride: int
+    @property
+    def partner_place(self) -> cl.Buffer: ...
+
+    @property
+    def partner_radiance(self) -> cl.Buffer: ...
+
+    @property
+    def stride(self) -> int: ...
 
 
 def reduce_pairs(film: Film, batch: Batch, slots: npt.NDArray[np.void], old: OldValues) -> None:

@@ -1,0 +1,42 @@
+"""The anchor: the scene that the kept picture is of, with which edited scenes are compared.
+
+Each edit is compared afresh with the anchor, not with the edit before it: in a drag of twenty steps the
+errors of twenty comparisons would pile up (docs of the strategy, section "Drags"). The same objects edited
+once more keep the anchor, also after the drag. Where others are edited, the picture as it is shown becomes
+the anchor: it is *folded*.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from incpt.render.plan import CountArray
+from incpt.scene.change import affected_objects, diff
+from incpt.scene.model import Object, Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Anchor:
+    """The scene that the film's radiance is of, and the samples (tiles,) that each tile of it is worth."""
+
+    scene: Scene
+    worth: CountArray
+
+    def affected(self, scene: Scene) -> tuple[Object, ...]:
+        """The objects that look different in `scene`, as they are here and as they are there."""
+        return tuple(affected_objects(self.scene, scene, diff(self.scene, scene)))
+
+    def touched(self, scene: Scene) -> frozenset[str]:
+        """The names of the objects that differ in `scene`, or that wear a material that does."""
+        return _touched(self.scene, scene)
+
+    def serves(self, scene: Scene, edited: Scene) -> bool:
+        """Whether an edit that makes `edited` of `scene` changes only what differs from the anchor already,
+        so that the anchor serves for what comes as well."""
+        return _touched(scene, edited) <= self.touched(scene)
+
+
+def _touched(old: Scene, new: Scene) -> frozenset[str]:
+    change = diff(old, new)
+    wearing = {obj.name for scene in (old, new) for obj in scene.objects if obj.material in change.materials}
+    return change.objects | wearing

@@ -1,0 +1,144 @@
+"""A scene beside its anchor, on the device: what is needed to compare them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from incpt.core.settings import RenderSettings
+from incpt.render.film import Film
+from incpt.render.first_hits import first_hits
+from incpt.render.impact.anchor import Anchor
+from incpt.render.impact.exploration import seen_tiles
+from incpt.render.impact.guides import Guides
+from incpt.render.impact.shrinkage import Shrinkage
+from incpt.render.impact.statistics import Statistics
+from incpt.render.impact.tile_sums import TileSums
+from incpt.render.tiles import TileGrid
+from incpt.render.tracer import Tracer
+from incpt.scene.model import Scene
+from incpt.tables.change_tables import ChangeTables, change_tables
+from incpt.tables.scene_tables import SceneTables, tables_of
+
+
+@dataclass(frozen=True, eq=False)
+class CenterHits:
+    """What the rays through pixel centres meet first, in a scene: the name's place in `names`, -1 for nothing
+    (H, W), and the shading normal in world space (H, W, 3)."""
+
+    scene: Scene
+    objects: npt.NDArray[np.int32]
+    normals: npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A scene and its anchor.
+
+    grid         the tiles of the picture.
+    anchor       the scene that the kept picture is of.
+    tables       the scene as it is now. Both choose their lights from one table.
+    changes      what paths can meet of their difference.
+    guides       which pixels are filtered together.
+    statistics   of the pairs that a film has, and `shrinkage` makes the picture; both hold what they work in.
+    anchor_hits  what is seen in the anchor, and `hits` in the scene.
+    """
+
+    grid: TileGrid
+    anchor: SceneTables
+    tables: SceneTables
+    changes: ChangeTables
+    guides: Guides
+    statistics: Statistics
+    shrinkage: Shrinkage
+    anchor_hits: CenterHits
+    hits: CenterHits
+
+    def update(self, film: Film) -> None:
+        """Make the picture of what the film has of pairs."""
+        self.statistics.update(film, self.guides)
+        self.shrinkage.update(film, self.guides, self.statistics)
+
+    def tile_sums(self, film: Film) -> TileSums:
+        """What the film has of pairs, tile by tile. It waits for the device."""
+        self.statistics.update(film, self.guides)
+        return self.statistics.tile_sums(film, self.guides, self.grid)
+
+
+def compared(
+    tracer: Tracer,
+    settings: RenderSettings,
+    anchor: Anchor,
+    scene: Scene,
+    tables: SceneTables,
+    before: Comparison | None = None,
+) -> Comparison:
+    """The comparison of a scene with its anchor. `tables` are those of the scene before the edit, with which
+    the new ones share what they can; `before`: its comparison. Raises DeviceError."""
+    pool, device = tables.pool, tracer.device
+    grid = TileGrid(*settings.size, settings.tile_size)
+    old = tables_of(pool, anchor.scene, tables)
+    new = tables_of(pool, scene, tables)
+    known = () if before is None or before.grid != grid else (before.anchor_hits, before.hits)
+    found = [hits for hits in known if hits.scene is anchor.scene]
+    anchor_hits = found[0] if found else center_hits(tracer, old, settings)
+    hits = _followed(anchor_hits, tracer, new, settings, grid, anchor)
+    labels, differ = _labels(anchor, scene, anchor_hits, hits)
+    guides = Guides(device, grid.width, grid.height)
+    guides.set(labels, hits.normals, differ)
+    if before is not None and before.grid == grid:
+        statistics, shrinkage = before.statistics, before.shrinkage
+    else:
+        statistics = Statistics(device, grid.width, grid.height)
+        shrinkage = Shrinkage(device, grid.width, grid.height)
+    changes = change_tables(device, anchor.scene, scene)
+    return Comparison(grid, old, new, changes, guides, statistics, shrinkage, anchor_hits, hits)
+
+
+def center_hits(tracer: Tracer, tables: SceneTables, settings: RenderSettings) -> CenterHits:
+    """What is seen in a scene."""
+    found = first_hits(tracer, tables, settings, settings.size)
+    return CenterHits(tables.scene, found.object_id, found.normal)
+
+
+def _followed(
+    before: CenterHits,
+    tracer: Tracer,
+    tables: SceneTables,
+    settings: RenderSettings,
+    grid: TileGrid,
+    anchor: Anchor,
+) -> CenterHits:
+    """What is seen in the scene of `tables`. Only rows in which the objects that differ are or were seen can
+    show something else than `before`."""
+    scene = tables.scene
+    number = {obj.name: i for i, obj in enumerate(scene.objects)}
+    # The last place is that of -1.
+    renumbered = np.array([number.get(obj.name, -1) for obj in before.scene.objects] + [-1], np.int32)
+    objects, normals = renumbered[before.objects], before.normals.copy()
+    seen = seen_tiles(grid, scene.camera, anchor.affected(scene))
+    if len(seen):
+        top = int(seen[0]) // grid.columns * grid.tile_size
+        bottom = min((int(seen[-1]) // grid.columns + 1) * grid.tile_size, grid.height)
+        found = first_hits(tracer, tables, settings, settings.size, (top, bottom))
+        objects[top:bottom], normals[top:bottom] = found.object_id, found.normal
+    return CenterHits(scene, objects, normals)
+
+
+def _labels(
+    anchor: Anchor, scene: Scene, old: CenterHits, new: CenterHits
+) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.bool_]]:
+    """(H, W) a number that is the same where both scenes show the same two objects, and whether what is seen
+    is an object that differs."""
+    number = {obj.name: i for i, obj in enumerate(anchor.scene.objects)}
+    for obj in scene.objects:
+        number.setdefault(obj.name, len(number))
+    common = np.array([number[obj.name] for obj in scene.objects] + [-1], np.int64)
+    before, now = old.objects.astype(np.int64), common[new.objects]
+    differs = np.zeros(len(number) + 1, np.bool_)
+    differs[[number[name] for name in anchor.touched(scene)]] = True
+    # Where there are so many objects that numbers wrap round, a few pixels are filtered together by mistake.
+    label = ((before + 1) * (len(number) + 1) + now + 1) & 0x7FFFFFFF
+    return label.astype(np.uint32), (before != now) | differs[before] | differs[now]
