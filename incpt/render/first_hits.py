@@ -20,6 +20,9 @@ from incpt.render.plan import Cursor, Queue, plan_step
 from incpt.render.tracer import Tracer
 from incpt.tables.scene_tables import SceneTables
 
+Window = tuple[int, int, int, int]
+"""A part of a picture in pixels: the first column and row, and the column and the row behind the last
+ones."""
 _SURFACE_PLANES = 7
 """Shading normal, distance, base colour: see cl/film/first_hits.cl."""
 
@@ -45,19 +48,20 @@ def first_hits(
     tables: SceneTables,
     settings: RenderSettings,
     size: tuple[int, int],
-    rows: tuple[int, int] | None = None,
+    window: Window | None = None,
 ) -> FirstHits:
-    """Those of a picture of `size` (width, height), or of its rows from the first of `rows` up to the second
-    only."""
-    width, whole_height = size
+    """Those of a picture of `size` (width, height), or of a window of it only."""
+    whole_width, whole_height = size
     params = path_params(tables, settings, size)
-    top, bottom = (0, whole_height) if rows is None else rows
-    height = bottom - top
-    # The rows are a picture of their own, of a camera that looks a little up or down.
+    left, top, right, bottom = (0, 0, *size) if window is None else window
+    width, height = right - left, bottom - top
+    # The window is a picture of its own, of a camera that looks a little aside.
     camera = params["camera"]
+    camera["forward"] += ((left + right) / whole_width - 1) * camera["right"]
     camera["forward"] += (1 - (top + bottom) / whole_height) * camera["up"]
+    camera["right"] *= width / whole_width
     camera["up"] *= height / whole_height
-    params["height"] = height
+    params["width"], params["height"] = width, height
     # Tiles of any size serve; these keep neighbouring rays together.
     params["tile_size"] = RenderSettings.tile_size
     grid = tiles.TileGrid(width, height, RenderSettings.tile_size)

@@ -302,7 +302,8 @@ class Session:
         size = self.size if size is None else replace(self.settings, size=size).size
         if rows is not None:
             rows = _rows(rows, size[1])
-        return first_hits.first_hits(self._tracer, self._tables, self.settings, size, rows)
+        window = None if rows is None else (0, rows[0], size[0], rows[1])
+        return first_hits.first_hits(self._tracer, self._tables, self.settings, size, window)
 
     def pick(self, pixel: tuple[int, int]) -> str | None:
         """The name of the object under a pixel (x, y) from the top left, or None. Raises InputError outside

@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from incpt.core.settings import RenderSettings
 from incpt.render.film import Film
-from incpt.render.first_hits import first_hits
+from incpt.render.first_hits import Window, first_hits
 from incpt.render.impact.anchor import Anchor
-from incpt.render.impact.exploration import seen_tiles
+from incpt.render.impact.exploration import windows
 from incpt.render.impact.guides import Guides
 from incpt.render.impact.shrinkage import Shrinkage
 from incpt.render.impact.statistics import Statistics
@@ -25,8 +25,8 @@ from incpt.tables.scene_tables import SceneTables, tables_of
 
 @dataclass(frozen=True, eq=False)
 class CenterHits:
-    """What the rays through pixel centres meet first, in a scene: the name's place in `names`, -1 for nothing
-    (H, W), and the shading normal in world space (H, W, 3)."""
+    """What the rays through pixel centres meet first in a scene: the object's place in it, or -1 (H, W), and
+    the shading normal in world space (H, W, 3)."""
 
     scene: Scene
     objects: npt.NDArray[np.int32]
@@ -84,8 +84,9 @@ def compared(
     known = () if before is None or before.grid != grid else (before.anchor_hits, before.hits)
     found = [hits for hits in known if hits.scene is anchor.scene]
     anchor_hits = found[0] if found else center_hits(tracer, old, settings)
-    hits = _followed(anchor_hits, tracer, new, settings, grid, anchor)
-    labels, differ = _labels(anchor, scene, anchor_hits, hits)
+    seen = windows(grid, scene.camera, anchor.affected(scene))
+    hits = _followed(anchor_hits, tracer, new, settings, seen)
+    labels, differ = _labels(anchor, anchor_hits, hits, seen)
     guides = Guides(device, grid.width, grid.height)
     guides.set(labels, hits.normals, differ)
     if before is not None and before.grid == grid:
@@ -104,41 +105,55 @@ def center_hits(tracer: Tracer, tables: SceneTables, settings: RenderSettings) -
 
 
 def _followed(
-    before: CenterHits,
-    tracer: Tracer,
-    tables: SceneTables,
-    settings: RenderSettings,
-    grid: TileGrid,
-    anchor: Anchor,
+    before: CenterHits, tracer: Tracer, tables: SceneTables, settings: RenderSettings, seen: list[Window]
 ) -> CenterHits:
-    """What is seen in the scene of `tables`. Only rows in which the objects that differ are or were seen can
-    show something else than `before`."""
+    """What is seen in the scene of `tables`, which shows something else than `before` in the windows `seen`
+    only."""
     scene = tables.scene
-    number = {obj.name: i for i, obj in enumerate(scene.objects)}
-    # The last place is that of -1.
-    renumbered = np.array([number.get(obj.name, -1) for obj in before.scene.objects] + [-1], np.int32)
-    objects, normals = renumbered[before.objects], before.normals.copy()
-    seen = seen_tiles(grid, scene.camera, anchor.affected(scene))
-    if len(seen):
-        top = int(seen[0]) // grid.columns * grid.tile_size
-        bottom = min((int(seen[-1]) // grid.columns + 1) * grid.tile_size, grid.height)
-        found = first_hits(tracer, tables, settings, settings.size, (top, bottom))
-        objects[top:bottom], normals[top:bottom] = found.object_id, found.normal
+    objects, normals = before.objects, before.normals.copy()
+    if [obj.name for obj in scene.objects] == [obj.name for obj in before.scene.objects]:
+        objects = objects.copy()
+    else:
+        number = {obj.name: i for i, obj in enumerate(scene.objects)}
+        # The last place is that of -1.
+        objects = np.array([number.get(obj.name, -1) for obj in before.scene.objects] + [-1], np.int32)[
+            objects
+        ]
+    for window in seen:
+        found = first_hits(tracer, tables, settings, settings.size, window)
+        objects[_inside(window)], normals[_inside(window)] = found.object_id, found.normal
     return CenterHits(scene, objects, normals)
 
 
 def _labels(
-    anchor: Anchor, scene: Scene, old: CenterHits, new: CenterHits
+    anchor: Anchor, old: CenterHits, new: CenterHits, seen: list[Window]
 ) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.bool_]]:
     """(H, W) a number that is the same where both scenes show the same two objects, and whether what is seen
     is an object that differs."""
     number = {obj.name: i for i, obj in enumerate(anchor.scene.objects)}
-    for obj in scene.objects:
+    for obj in new.scene.objects:
         number.setdefault(obj.name, len(number))
-    common = np.array([number[obj.name] for obj in scene.objects] + [-1], np.int64)
-    before, now = old.objects.astype(np.int64), common[new.objects]
+    common = np.array([number[obj.name] for obj in new.scene.objects] + [-1], np.int32)
     differs = np.zeros(len(number) + 1, np.bool_)
-    differs[[number[name] for name in anchor.touched(scene)]] = True
-    # Where there are so many objects that numbers wrap round, a few pixels are filtered together by mistake.
-    label = ((before + 1) * (len(number) + 1) + now + 1) & 0x7FFFFFFF
-    return label.astype(np.uint32), (before != now) | differs[before] | differs[now]
+    differs[[number[name] for name in anchor.touched(new.scene)]] = True
+    # Outside of the windows both scenes show the same.
+    labels = _label(old.objects, old.objects)
+    changed = np.zeros(labels.shape, np.bool_)
+    for window in seen:
+        inside = _inside(window)
+        before, now = old.objects[inside], common[new.objects[inside]]
+        labels[inside] = _label(before, now)
+        changed[inside] = (before != now) | differs[before] | differs[now]
+    return labels, changed
+
+
+def _label(before: npt.NDArray[np.int32], now: npt.NDArray[np.int32]) -> npt.NDArray[np.uint32]:
+    """A number below 2^31 for two objects. Where there are more than 32,768 of them, a few pixels are
+    filtered together by mistake."""
+    pair = (before + 1).astype(np.uint32) * np.uint32(1 << 16) + (now + 1).astype(np.uint32)
+    return pair & np.uint32(0x7FFFFFFF)
+
+
+def _inside(window: Window) -> tuple[slice, slice]:
+    left, top, right, bottom = window
+    return slice(top, bottom), slice(left, right)

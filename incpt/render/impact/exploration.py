@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core import affine
+from incpt.render.first_hits import Window
 from incpt.render.plan import SPARSE_STEP
 from incpt.render.tiles import IntArray, TileGrid
 from incpt.scene.camera import Camera
@@ -26,18 +27,32 @@ def squares(grid: TileGrid, chosen: npt.NDArray[np.bool_]) -> IntArray:
     return (SPARSE_STEP * (row * grid.columns + column)).astype(np.int32)
 
 
-def seen_tiles(grid: TileGrid, camera: Camera, objects: tuple[Object, ...]) -> IntArray:
-    """The tiles in the rectangles around what is seen of the bounds of objects, one by one, in order. Corners
-    behind the camera do not count."""
-    chosen = np.zeros((grid.rows, grid.columns), np.bool_)
+def windows(grid: TileGrid, camera: Camera, objects: tuple[Object, ...]) -> list[Window]:
+    """The rectangles around what is seen of the bounds of each object. Corners behind the camera do not
+    count."""
+    found = []
     for obj in objects:
         places, in_front = camera.project(affine.box_corners(obj.world_bounds), grid.width / grid.height)
         if not in_front.any():
             continue
         pixels = places[in_front] * (grid.width, grid.height)
+        # Corners may be anywhere, also beyond what whole numbers hold.
         low = np.clip(np.floor(pixels.min(axis=0)), 0, [grid.width, grid.height]).astype(int)
         high = np.clip(np.ceil(pixels.max(axis=0)), 0, [grid.width, grid.height]).astype(int)
         if (low < high).all():
-            (left, top), (right, bottom) = low // grid.tile_size, -(-high // grid.tile_size)
-            chosen[top:bottom, left:right] = True
-    return np.flatnonzero(chosen).astype(np.int32)
+            found.append((int(low[0]), int(low[1]), int(high[0]), int(high[1])))
+    return found
+
+
+def seen_tiles(grid: TileGrid, camera: Camera, objects: tuple[Object, ...]) -> IntArray:
+    """The tiles in the windows of the objects, row by row for each object, each tile once."""
+    chosen = [
+        (np.arange(top // size, -(-bottom // size))[:, None] * grid.columns
+         + np.arange(left // size, -(-right // size))[None, :]).ravel()
+        for size in (grid.tile_size,)
+        for left, top, right, bottom in windows(grid, camera, objects)
+    ]  # fmt: skip
+    if not chosen:
+        return np.zeros(0, np.int32)
+    tiles, first = np.unique(np.concatenate(chosen), return_index=True)
+    return tiles[np.argsort(first)].astype(np.int32)
