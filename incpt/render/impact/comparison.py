@@ -56,6 +56,10 @@ class Comparison:
     anchor_hits: CenterHits
     hits: CenterHits
 
+    def compares(self, anchor: Scene, scene: Scene) -> bool:
+        """Whether it is that of these two scenes."""
+        return self.anchor.scene is anchor and self.tables.scene is scene
+
     def update(self, film: Film) -> None:
         """Make the picture of what the film has of pairs."""
         self.statistics.update(film, self.guides)
@@ -79,6 +83,8 @@ def compared(
     the new ones share what they can; `before`: its comparison. Raises DeviceError."""
     pool, device = tables.pool, tracer.device
     grid = TileGrid(*settings.size, settings.tile_size)
+    if before is not None and before.compares(anchor.scene, scene) and before.grid == grid:
+        return before
     old = tables_of(pool, anchor.scene, tables)
     new = tables_of(pool, scene, tables)
     known = () if before is None or before.grid != grid else (before.anchor_hits, before.hits)

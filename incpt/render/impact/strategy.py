@@ -65,12 +65,15 @@ class Impact(Strategy):
 
     def _first_round(self, situation: Situation) -> Round:
         grid = situation.grid
-        everywhere = exploration.squares(grid, np.ones(grid.count, np.bool_))
-        seen = exploration.seen_tiles(grid, situation.scene.camera, situation.affected)
+        # The new place first: who drags an object looks at it.
+        seen = exploration.seen_tiles(grid, situation.scene.camera, situation.affected[::-1])
+        is_seen = np.zeros(grid.count, np.bool_)
+        is_seen[seen] = True
+        near, all_squares = (exploration.squares(grid, chosen) for chosen in (is_seen, is_seen | True))
+        everywhere = np.concatenate([near, np.setdiff1d(all_squares, near)])
         samples = np.full(len(seen), SEEN_SAMPLES, np.int64)
-        return _round(
-            everywhere, 0, seen, samples, np.zeros(len(seen), np.bool_), np.zeros(grid.count, np.int64)
-        )
+        singles, worth = np.zeros(len(seen), np.bool_), np.zeros(grid.count, np.int64)
+        return _round(everywhere, 0, seen, samples, singles, worth)
 
     def _next_round(self, situation: Situation) -> Round:
         grid, queue = situation.grid, situation.queue
