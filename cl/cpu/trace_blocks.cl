@@ -282,6 +282,19 @@ STAGE void finish_paths(const Block *block, BlockRay *ray) {
 }
 #endif
 
+#if defined(CHANGES) && defined(TRIANGLE_LIGHTS)
+// As touch_rays, of the lights that paths ask for, before they are shaded.
+STAGE void touch_lights(const Block *block, const BlockRay *ray) {
+    const State *state = &block->state;
+    const Changes *changes = block->changes;
+    const uint count = ray->count;
+    LANES
+    for (int i = 0; i < (int)count; i++)
+        touch(changes, load_result(state, i),
+              asks_for_changed_light(block->params, &block->shading, &block->emitters, state, i));
+}
+#endif
+
 #ifdef LIGHT_SAMPLING
 #ifdef CHANGES
 // As touch_rays, of the shadow rays that are going to be traced.

@@ -99,15 +99,27 @@ INLINE Vec3 light_vec3(__global const float *plane, uint stride, uint i) {
     return vec3(plane[i], plane[stride + i], plane[2 * stride + i]);
 }
 
-// `choice` selects the triangle (Walker's alias method), `uv` the point on it.
-INLINE LightSample sample_triangle_light(const Params *params, const Emitters *emitters, Vec3 position,
-                                         Uniform2 uv, float choice) {
+// The triangle that `choice` selects (Walker's alias method).
+INLINE uint chosen_triangle(const Params *params, const Emitters *emitters, float choice) {
     uint stride = params->light_count;
     __global const float *lights = emitters->lights;
     float scaled_choice = choice * (float)stride;
     uint cell = MIN((uint)scaled_choice, stride - 1u);
     uint alias = ((__global const uint *)lights)[LIGHT_ALIAS * stride + cell];
-    uint light = scaled_choice - (float)cell < lights[LIGHT_ALIAS_PROBABILITY * stride + cell] ? cell : alias;
+    return scaled_choice - (float)cell < lights[LIGHT_ALIAS_PROBABILITY * stride + cell] ? cell : alias;
+}
+
+// Of LightFlag.
+INLINE uint light_flags(const Params *params, const Emitters *emitters, uint light) {
+    return ((__global const uint *)emitters->lights)[LIGHT_FLAGS * params->light_count + light];
+}
+
+// `choice` selects the triangle, `uv` the point on it.
+INLINE LightSample sample_triangle_light(const Params *params, const Emitters *emitters, Vec3 position,
+                                         Uniform2 uv, float choice) {
+    uint stride = params->light_count;
+    __global const float *lights = emitters->lights;
+    uint light = chosen_triangle(params, emitters, choice);
     float b1, b2;
     sample_triangle(uv.u, uv.v, &b1, &b2);
     Vec3 vertex = light_vec3(lights + LIGHT_VERTEX_X * stride, stride, light);
@@ -121,13 +133,21 @@ INLINE LightSample sample_triangle_light(const Params *params, const Emitters *e
     result.distance = SQRT(squared);
     result.direction = scale(1.0f / MAX(result.distance, 1e-30f), to_light);
     float cosine = -dot(normal, result.direction);
-    int double_sided = ((__global const uint *)lights)[LIGHT_DOUBLE_SIDED * stride + light] != 0u;
+    int double_sided = (light_flags(params, emitters, light) & LIGHT_DOUBLE_SIDED) != 0u;
     int shines = double_sided | (cosine > 0.0f);
     float facing = FABS(cosine);
     int valid = shines & (facing > 1e-7f) & (squared > 0.0f);
     result.radiance = light_vec3(lights + LIGHT_EMISSION_R * stride, stride, light);
     result.pdf = valid ? lights[LIGHT_PDF_AREA * stride + light] * squared / (valid ? facing : 1.0f) : 0.0f;
     return result;
+}
+#endif
+
+#if defined(ENVIRONMENT_IMAGE) && defined(TRIANGLE_LIGHTS)
+// The choice among the triangles, where the first one has not turned to the environment.
+INLINE float second_choice(const Params *params, float choice) {
+    float p = params->environment_probability;
+    return MIN(MAX(choice - p, 0.0f) / (1.0f - p), 0.99999994f);
 }
 #endif
 
@@ -139,8 +159,7 @@ INLINE LightSample sample_light(const Params *params, const Emitters *emitters, 
     float p = params->environment_probability;
     int far = choice < p;
     LightSample a = sample_environment(params, emitters, uv);
-    LightSample b = sample_triangle_light(params, emitters, position, uv,
-                                          MIN(MAX(choice - p, 0.0f) / (1.0f - p), 0.99999994f));
+    LightSample b = sample_triangle_light(params, emitters, position, uv, second_choice(params, choice));
     LightSample result;
     result.direction = select(far, a.direction, b.direction);
     result.distance = far ? a.distance : b.distance;
@@ -154,6 +173,19 @@ INLINE LightSample sample_light(const Params *params, const Emitters *emitters, 
 #endif
 }
 #endif
+
+// Whether `choice` leads to a light that differs between two scenes.
+INLINE uint chooses_changed_light(const Params *params, const Emitters *emitters, float choice) {
+#if defined(ENVIRONMENT_IMAGE) && defined(TRIANGLE_LIGHTS)
+    uint near = choice >= params->environment_probability;
+    uint light = chosen_triangle(params, emitters, second_choice(params, choice));
+    return near & ((light_flags(params, emitters, light) & LIGHT_CHANGED) != 0u);
+#elif defined(TRIANGLE_LIGHTS)
+    return (light_flags(params, emitters, chosen_triangle(params, emitters, choice)) & LIGHT_CHANGED) != 0u;
+#else
+    return 0u;
+#endif
+}
 
 // Radiance that a surface emits towards the origin of the ray that has met it, weighted against light
 // sampling, which would have found the point with the material's area density. `facing` is the cosine between

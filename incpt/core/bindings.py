@@ -450,6 +450,7 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     "trace_shadow": (LAUNCH, LIST, GEOMETRY, PATH_STATE),
     "write_aovs": (LAUNCH, LIST, SHADING, PATH_STATE),
     "touch_rays": (LAUNCH, LIST, PATH_STATE, CHANGES),
+    "touch_lights": (LAUNCH, LIST, SHADING, EMITTERS, PATH_STATE, CHANGES),
     "touch_shadow_rays": (LAUNCH, LIST, PATH_STATE, CHANGES),
     "trace_blocks": (LAUNCH, SLOTS, PLACES, *BLOCK, RADIANCE, CHANGES),
     "count_partners": (LAUNCH, SLOTS, PARTNERS),
@@ -485,6 +486,7 @@ KERNELS: dict[str, tuple[Group, ...]] = {
 
 FILES = {
     "touch_rays": "changes",
+    "touch_lights": "changes",
     "touch_shadow_rays": "changes",
     "count_partners": "partners",
     "list_partners": "partners",

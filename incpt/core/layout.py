@@ -173,7 +173,7 @@ class LightPlane(IntEnum):
     before PoCL comes to vectorise over work-items, and those it does not vectorise over.
 
     PDF_AREA is the density of choosing the triangle and a point on it, per square metre; ALIAS (uint) and
-    ALIAS_PROBABILITY are the Walker/Vose table over the triangles; DOUBLE_SIDED is 0 or 1 (uint).
+    ALIAS_PROBABILITY are the Walker/Vose table over the triangles; FLAGS are of LightFlag (uint).
     """
 
     VERTEX_X = 0
@@ -191,7 +191,14 @@ class LightPlane(IntEnum):
     PDF_AREA = 12
     ALIAS_PROBABILITY = 13
     ALIAS = 14
-    DOUBLE_SIDED = 15
+    FLAGS = 15
+
+
+class LightFlag(IntFlag):
+    """Properties of a light. CHANGED: it differs between two scenes that choose from the same lights."""
+
+    DOUBLE_SIDED = 1
+    CHANGED = 2
 
 
 class SamplePlane(IntEnum):
@@ -595,6 +602,7 @@ CHANGE = _packed(
         ("reach", np.float32),  # the largest coordinate of the boxes
         ("padding", np.float32),  # of boxes, per metre of `reach` and of the largest coordinate of an origin
         ("has_objects", np.uint32),  # 1: there are objects on which a hit is enough
+        ("has_lights", np.uint32),  # 1: lights differ, see LightFlag.CHANGED
     ]
 )
 
@@ -661,6 +669,7 @@ def c_header() -> str:
         (PathPlane, "PATH"),
         (ShadowPlane, "SHADOW"),
         (LightPlane, "LIGHT"),
+        (LightFlag, "LIGHT"),
         (SamplePlane, "SAMPLE"),
         (PairPlane, "PAIR"),
         (CellSum, "CELL_SUM"),

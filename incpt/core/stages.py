@@ -5,8 +5,8 @@ stage over a list of paths. Blocks of paths (cl/cpu/trace_blocks.cl) call a func
 over paths of the block; the header has these calls as STAGES_OF_RAY.
 
 Whether a condition holds is known at three times. Features are known when kernels are built: a stage that
-lacks one is left out, and one that has it does not ask. Whether there is a sky is known when paths are
-traced; the rest, ray by ray.
+lacks one is left out, and one that has it does not ask. Whether there is a sky, and whether lights differ
+between two scenes, is known when paths are traced; the rest, ray by ray.
 """
 
 from __future__ import annotations
@@ -24,12 +24,16 @@ class When(Flag):
 
     LIGHTS = auto()
     """There are lights to sample: emissive triangles, or an image of the environment."""
+    LAMPS = auto()
+    """There are emissive triangles among them."""
     MEDIA = auto()
     """There are materials that let light through."""
     AOVS = auto()
     """Auxiliary images are asked for."""
     CHANGES = auto()
     """It is asked of paths whether they meet something that changed between two scenes."""
+    CHANGED_LIGHTS = auto()
+    """Some of the lights differ between the two scenes."""
     SKY = auto()
     """Light comes from far away."""
     CAMERA_RAY = auto()
@@ -46,8 +50,8 @@ class Stage:
 
     kernel  the kernel of cl/path/ that does it for a list of paths; None: that of the stage before has done
             it.
-    loop    the function of cl/cpu/trace_blocks.cl that does it for a block; None: that of the stage which
-            shades these paths does it first.
+    loop    the function of cl/cpu/trace_blocks.cl that does it for a block; None: that of another stage does
+            it for these paths too.
     paths   which paths go through it.
     when    all that must hold.
     sorts   the lists that these paths then join, by what they wait for; LIVE is that of the next ray. Only a
@@ -61,12 +65,16 @@ class Stage:
     sorts: tuple[PathList, ...] = ()
 
 
+_TOUCHES_LIGHTS = When.CHANGES | When.LAMPS | When.CHANGED_LIGHTS
+
 STAGES = (
     Stage("intersect", "trace_rays", PathList.LIVE, sorts=(PathList.SURFACE, PathList.MISS, PathList.MEDIUM)),
     Stage("touch_rays", "touch_rays", PathList.LIVE, When.CHANGES),
     Stage("shade_miss", "shade_misses", PathList.MISS, When.SKY),
     Stage(None, "setup_surfaces", PathList.LIVE),
     Stage("write_aovs", "write_aovs", PathList.LIVE, When.AOVS | When.CAMERA_RAY),
+    Stage("touch_lights", "touch_lights", PathList.SURFACE, _TOUCHES_LIGHTS | When.GOES_ON),
+    Stage("touch_lights", None, PathList.MEDIUM, _TOUCHES_LIGHTS | When.MEDIA),
     Stage("sample_lights", None, PathList.SURFACE, When.LIGHTS | When.GOES_ON),
     Stage("sample_lights", None, PathList.MEDIUM, When.LIGHTS | When.MEDIA),
     # Paths that turn out to stand on an opaque surface join those that are shaded as such.
@@ -80,10 +88,10 @@ STAGES = (
 )  # fmt: skip
 """All stages of a ray, in order. They lie between `generate`, which starts paths, and the next ray."""
 
-_BY_FEATURES = When.LIGHTS | When.MEDIA | When.AOVS | When.CHANGES
+_BY_FEATURES = When.LIGHTS | When.LAMPS | When.MEDIA | When.AOVS | When.CHANGES
 _HOLDS = {
     "ENVIRONMENT_IMAGE": When.LIGHTS,
-    "TRIANGLE_LIGHTS": When.LIGHTS,
+    "TRIANGLE_LIGHTS": When.LIGHTS | When.LAMPS,
     "MEDIA": When.MEDIA | When.GOES_ON,
     "AOVS": When.AOVS,
     "CHANGES": When.CHANGES,
@@ -91,6 +99,7 @@ _HOLDS = {
 """What holds on every ray where kernels have a feature."""
 
 _IN_C = {
+    When.CHANGED_LIGHTS: "(block)->changes->change.has_lights",
     When.SKY: "(block)->params->sees_sky",
     When.CAMERA_RAY: "(ray)->number == 0",
     When.GOES_ON: "(ray)->number != (block)->params->last_ray",
@@ -117,12 +126,14 @@ def last_ray(max_bounces: int, has_media: bool) -> int:
     return layout.MOST_RAYS - 1 if has_media else min(max_bounces + 1, layout.MOST_RAYS - 1)
 
 
-def holding(ray: int, last: int, sees_sky: bool) -> When:
+def holding(ray: int, last: int, sees_sky: bool, has_changed_lights: bool = False) -> When:
     """What holds on ray number `ray`, beside what features say; `last` is the number of the last one."""
     holds = When.ENDS if ray == last else When.GOES_ON
     if ray == 0:
         holds |= When.CAMERA_RAY
-    return holds | When.SKY if sees_sky else holds
+    if sees_sky:
+        holds |= When.SKY
+    return holds | When.CHANGED_LIGHTS if has_changed_lights else holds
 
 
 def c_header(features: Collection[str]) -> str:

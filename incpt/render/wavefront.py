@@ -174,7 +174,10 @@ class Wavefront:
 
     def _trace_ray(self, chunk: _Chunk, ray: int, bound: int) -> None:
         """Ray number `ray` of every live path, which are `bound` at most."""
-        holds = holding(ray, int(chunk.params["last_ray"]), bool(chunk.params["sees_sky"]))
+        test = chunk.batch.touch_test
+        has_changed_lights = test is not None and bool(test.changes.change["has_lights"])
+        sees_sky = bool(chunk.params["sees_sky"])
+        holds = holding(ray, int(chunk.params["last_ray"]), sees_sky, has_changed_lights)
         for one in chunk.launches:
             stage = one.stage
             if stage.when in holds:

@@ -13,6 +13,7 @@ from incpt.core import affine, layout
 from incpt.device.device import Device
 from incpt.scene.change import Change, diff
 from incpt.scene.model import Object, Scene
+from incpt.tables.light_pairs import has_same_emitters
 
 _PADDING = 2.0**-19
 """Of boxes, per metre of distance from the world's origin. Float32 rounds by 2^-24, and some ten roundings
@@ -32,17 +33,19 @@ class Difference:
     boxes    (N, 2, 3) bounds in world space around objects that are elsewhere, have another shape, or have
              come or gone, where they were and where they are. None where only materials differ.
     objects  (len(objects),) whether it is enough that a path meets the object, whose material is another one.
+    lights   whether lights differ: then the scenes need `paired_tables`, which say which of them do.
     padding  of the boxes, per metre of distance from the world's origin.
     """
 
     boxes: Boxes
     objects: npt.NDArray[np.bool_]
+    lights: bool
     padding: float
 
     @property
     def is_empty(self) -> bool:
         """Whether no path can meet any of it."""
-        return not (len(self.boxes) or self.objects.any())
+        return not (len(self.boxes) or self.objects.any() or self.lights)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +80,8 @@ def difference(old: Scene, new: Scene) -> Difference:
     ]
     boxes = np.array([obj.world_bounds for obj in placed]).reshape(-1, 2, 3)
     padding = _PADDING * max((_amplification(obj) for obj in placed), default=1.0)
-    return Difference(boxes, _with_other_materials(new, change), padding)
+    differing = not has_same_emitters(old, new)
+    return Difference(boxes, _with_other_materials(new, change), differing, padding)
 
 
 def _displaced(change: Change) -> frozenset[str]:
@@ -106,7 +110,7 @@ def _amplification(obj: Object) -> float:
 def change_row(found: Difference) -> npt.NDArray[np.void]:
     """() layout.CHANGE with at most layout.MOST_CHANGED_BOXES boxes that cover those of the difference."""
     row = np.zeros((), layout.CHANGE)
-    row["has_objects"] = found.objects.any()
+    row["has_objects"], row["has_lights"] = found.objects.any(), found.lights
     row["padding"] = found.padding
     boxes = joined(found.boxes, layout.MOST_CHANGED_BOXES)
     if len(boxes) % 2:

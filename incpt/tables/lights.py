@@ -14,6 +14,8 @@ from incpt.device.device import Device
 from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
 
+Array = npt.NDArray[np.float64]
+
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 SMALLEST_AREA = 1e-18
@@ -23,7 +25,7 @@ SMALLEST_WEIGHT = float(np.finfo(np.float32).tiny)
 """The least `radiant_weight` of lights: in single precision less is black."""
 
 
-def luminance(color: npt.ArrayLike) -> npt.NDArray[np.float64]:
+def luminance(color: npt.ArrayLike) -> Array:
     """Rec. 709 luminance of linear colours (..., 3)."""
     return np.asarray(np.asarray(color, np.float64) @ _LUMINANCE)
 
@@ -60,63 +62,82 @@ class LightTables:
     densities: Mapping[str, float]
     environment_probability: float
 
+    @classmethod
+    def of(cls, device: Device, triangles: TriangleLights, has_image: bool) -> LightTables:
+        """Those of triangles that were chosen with `share_of_triangles`; `has_image` tells whether the
+        environment has an image that shines."""
+        share = share_of_triangles(has_image) if triangles.count else 0.0
+        probability = 1.0 - share if has_image else 0.0
+        buffers = {"lights": device.upload(triangles.planes)}
+        return cls(buffers, triangles.count, triangles.densities, probability)
+
 
 def light_tables(device: Device, scene: Scene, has_image: bool) -> LightTables:
     """Those of a scene; `has_image` tells whether its environment has an image that shines."""
-    share = 0.0 if not _emissive_objects(scene) else 0.5 if has_image else 1.0
-    table = triangle_lights(scene, share)
-    if table.count == 0:
-        share = 0.0
-    return LightTables(
-        {"lights": device.upload(table.planes)},
-        table.count,
-        densities=table.densities,
-        environment_probability=1.0 - share if has_image else 0.0,
-    )
+    return LightTables.of(device, triangle_lights(scene, share_of_triangles(has_image)), has_image)
+
+
+def share_of_triangles(has_image: bool) -> float:
+    """The chance that light sampling turns to triangles, if there are any; `has_image`: beside an image."""
+    return 0.5 if has_image else 1.0
 
 
 def triangle_lights(scene: Scene, share: float) -> TriangleLights:
     """Every visible emissive triangle that is large and bright enough. `share` is the chance that light
     sampling turns to triangles at all; the densities contain it."""
-    objects = _emissive_objects(scene)
+    objects = emissive_objects(scene)
     if not objects:
         return TriangleLights(np.zeros((len(layout.LightPlane), 0), np.float32), {})
     materials = [scene.materials[obj.material] for obj in objects]
-    corners = np.concatenate([_world_corners(obj) for obj in objects])
-    edge_1, edge_2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = np.linalg.norm(np.cross(edge_1, edge_2), axis=1) / 2
+    corners = np.concatenate([world_corners(obj) for obj in objects])
+    area = areas(corners)
     owner = np.repeat(np.arange(len(objects)), [len(obj.mesh.faces) for obj in objects])
     weights = np.array([radiant_weight(material) for material in materials])
     kept = (area >= SMALLEST_AREA) & (weights >= SMALLEST_WEIGHT)[owner]
     owner, power = owner[kept], weights[owner[kept]] * area[kept]
-
-    planes = np.zeros((len(layout.LightPlane), len(owner)), np.float32)
     if len(owner) == 0:
-        return TriangleLights(planes, {})
+        return TriangleLights(np.zeros((len(layout.LightPlane), 0), np.float32), {})
+
     density = weights * (share / float(power.sum()))
-    plane = layout.LightPlane
-    planes[plane.VERTEX_X : plane.VERTEX_Z + 1] = corners[kept, 0].T
-    planes[plane.EDGE_1_X : plane.EDGE_1_Z + 1] = edge_1[kept].T
-    planes[plane.EDGE_2_X : plane.EDGE_2_Z + 1] = edge_2[kept].T
-    planes[plane.EMISSION_R : plane.EMISSION_B + 1] = np.array([m.emission for m in materials])[owner].T
-    planes[plane.PDF_AREA] = density[owner]
-    planes[plane.ALIAS_PROBABILITY], alias = alias_table(power)
-    planes[plane.ALIAS] = alias.view(np.float32)
-    double_sided = np.array([material.double_sided for material in materials], np.uint32)
-    planes[plane.DOUBLE_SIDED] = double_sided[owner].view(np.float32)
+    emission = np.array([material.emission for material in materials])
+    sides = np.array([material.double_sided for material in materials]) * layout.LightFlag.DOUBLE_SIDED
+    planes = light_planes(corners[kept], emission[owner], density[owner], power, sides[owner])
     lit = np.flatnonzero(np.bincount(owner)).tolist()
     return TriangleLights(planes, {objects[i].material: float(density[i]) for i in lit})
 
 
-def _world_corners(obj: Object) -> npt.NDArray[np.float64]:
+def light_planes(
+    corners: Array, emission: Array, density: Array, power: Array, flags: npt.NDArray[np.integer]
+) -> npt.NDArray[np.float32]:
+    """(len(LightPlane), N) of triangles (N, 3, 3), which are chosen by their power; one of them at least."""
+    plane = layout.LightPlane
+    planes = np.zeros((len(plane), len(corners)), np.float32)
+    planes[plane.VERTEX_X : plane.VERTEX_Z + 1] = corners[:, 0].T
+    planes[plane.EDGE_1_X : plane.EDGE_1_Z + 1] = (corners[:, 1] - corners[:, 0]).T
+    planes[plane.EDGE_2_X : plane.EDGE_2_Z + 1] = (corners[:, 2] - corners[:, 0]).T
+    planes[plane.EMISSION_R : plane.EMISSION_B + 1] = emission.T
+    planes[plane.PDF_AREA] = density
+    planes[plane.ALIAS_PROBABILITY], alias = alias_table(power)
+    planes[plane.ALIAS] = alias.view(np.float32)
+    planes[plane.FLAGS] = flags.astype(np.uint32).view(np.float32)
+    return planes
+
+
+def areas(corners: Array) -> Array:
+    """(N,) of triangles (N, 3, 3)."""
+    edge_1, edge_2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return np.asarray(np.linalg.norm(np.cross(edge_1, edge_2), axis=1) / 2)
+
+
+def world_corners(obj: Object) -> Array:
     """(F, 3, 3) of its triangles, in world space, counter-clockwise from outside."""
     # A mirrored face keeps its outside: two corners change places to keep it on the normal's side.
     mirrored = np.linalg.det(obj.world_from_object[:, :3]) < 0
     faces = obj.mesh.faces[:, [0, 2, 1]] if mirrored else obj.mesh.faces
-    return affine.apply(obj.world_from_object, obj.mesh.vertices)[faces]
+    return np.asarray(affine.apply(obj.world_from_object, obj.mesh.vertices)[faces])
 
 
-def _emissive_objects(scene: Scene) -> list[Object]:
+def emissive_objects(scene: Scene) -> list[Object]:
     """Those that are seen. They are few as a rule, and looking for them must be quick among thousands."""
     emissive = {name for name, material in scene.materials.items() if material.is_emissive}
     return [obj for obj in scene.objects if obj.material in emissive and obj.visible]

@@ -9,7 +9,7 @@ nothing, since the camera travels with the parameters of every launch.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
 from weakref import WeakKeyDictionary, WeakValueDictionary
@@ -22,6 +22,7 @@ from incpt.scene.mesh import Mesh
 from incpt.scene.model import Scene
 from incpt.tables.environment import EnvironmentTables, environment_tables
 from incpt.tables.geometry_pool import GeometryPool, PooledMesh
+from incpt.tables.light_pairs import has_same_emitters, paired_light_tables
 from incpt.tables.lights import LightTables, light_tables
 from incpt.tables.materials import MaterialTables, material_tables
 from incpt.tables.object_table import NO_OBJECTS, PlacedObjects
@@ -32,7 +33,10 @@ _Part = TypeVar("_Part")
 
 @dataclass(frozen=True, eq=False)
 class SceneTables:
-    """What the kernels read of `scene`, in parts. Made by `tables_of`."""
+    """What the kernels read of `scene`, in parts. Made by `tables_of`, or by `paired_tables`.
+
+    unpaired: the tables that the scene has alone, where these choose lights together with another scene.
+    """
 
     pool: GeometryPool
     scene: Scene
@@ -42,6 +46,7 @@ class SceneTables:
     environment: EnvironmentTables
     lights: LightTables
     materials: MaterialTables
+    unpaired: SceneTables | None = None
 
     def buffer(self, name: str) -> cl.Buffer:
         """One of the buffers: nodes, objects, materials, layers ... as it is now; see GeometryPool.buffer."""
@@ -132,7 +137,33 @@ def tables_of(pool: GeometryPool, scene: Scene, previous: SceneTables | None = N
     return tables
 
 
+def paired_tables(
+    pool: GeometryPool, old: Scene, new: Scene, previous: SceneTables | None = None
+) -> tuple[SceneTables, SceneTables]:
+    """The tables of two scenes with the same environment, which choose among the same lights with the same
+    chances; see `light_pairs`. Where their lights are the same anyway these are what `tables_of` gives, else
+    they share all but lights and materials with that. Raises DeviceError."""
+    first = tables_of(pool, old, previous)
+    second = tables_of(pool, new, first)
+    if has_same_emitters(old, new):
+        return first, second
+    device, has_image = pool.device, _has_image_light(old, first.environment)
+    pairs = zip((first, second), paired_light_tables(device, old, new, has_image), strict=True)
+    before, after = (
+        replace(
+            tables,
+            lights=lights,
+            materials=material_tables(device, tables.scene.materials, lights.densities),
+            unpaired=tables,
+        )
+        for tables, lights in pairs
+    )
+    return before, after
+
+
 def _make(pool: GeometryPool, scene: Scene, previous: SceneTables | None) -> SceneTables:
+    if previous is not None:
+        previous = previous.unpaired or previous
     change = None if previous is None else diff(previous.scene, scene)
     device = pool.device
 

@@ -33,7 +33,8 @@ def files_of_kernels() -> dict[str, str]:
 
 
 FILES = files_of_kernels()
-FEATURES = {"sample_lights": ("TRIANGLE_LIGHTS",), "trace_blocks": ("TRIANGLE_LIGHTS", "MEDIA", "AOVS")}
+FEATURES = dict.fromkeys(("sample_lights", "touch_lights"), ("TRIANGLE_LIGHTS",))
+FEATURES["trace_blocks"] = ("TRIANGLE_LIGHTS", "MEDIA", "AOVS")
 
 
 def declared(device: Device, name: str) -> list[tuple[str, str]]:

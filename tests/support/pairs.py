@@ -15,7 +15,7 @@ from incpt.render.session import Session
 from incpt.render.wavefront import Wavefront
 from incpt.scene.model import Scene
 from incpt.tables.change_tables import ChangeTables, change_tables
-from incpt.tables.scene_tables import SceneTables, tables_of
+from incpt.tables.scene_tables import paired_tables
 
 Floats = npt.NDArray[np.float32]
 
@@ -86,7 +86,9 @@ def traced_pairs(
     if single is not None:
         slots["flags"][single] |= np.uint32(layout.SlotFlag.SINGLE)
     path_buffer = session._state.path_buffer.grown(device, count, tile_size)
-    batch = session._batch(slots, path_buffer)
+    before = session._state.tables
+    tables, new_tables = paired_tables(before.pool, old, new, before)
+    batch = replace(session._batch(slots, path_buffer), tables=new_tables)
     paths = batch.path_count
 
     def read(buffer: cl.Buffer, stride: int, used: int) -> Floats:
@@ -95,7 +97,6 @@ def traced_pairs(
     def read_uints(buffer: cl.Buffer, used: int) -> npt.NDArray[np.uint32]:
         return device.read(buffer, np.empty(used, np.uint32))
 
-    tables = _tables(session, old)
     changes = change_tables(device, old, new) if changes is None else changes
     buffers = PairBuffers.of(device, path_buffer.stride)
     partners = PairTracer(session._tracer).trace(batch, tables, changes, buffers)
@@ -110,13 +111,8 @@ def traced_pairs(
         read_uints(buffers.partner_place, paths),
         read_uints(buffers.partners, partners) if partners else np.zeros(0, np.uint32),
         read(buffers.partner_radiance, buffers.stride, partners),
-        tables.variant == session._state.tables.variant,
+        tables.variant == new_tables.variant,
     )
-
-
-def _tables(session: Session, scene: Scene) -> SceneTables:
-    before = session._state.tables
-    return tables_of(before.pool, scene, before)
 
 
 def check(pairs: TracedPairs, at_most: float = 1.0, differs: bool = True) -> None:

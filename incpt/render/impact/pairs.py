@@ -62,9 +62,11 @@ class PairTracer:
 
     def trace(self, batch: Batch, old: SceneTables, changes: ChangeTables, buffers: PairBuffers) -> int:
         """Trace the paths of `batch` as `Tracer.trace` does, and their partners in the scene of the tables
-        `old`; `changes` is the difference from that scene to the batch's. Returns how many partners there
-        are. It waits for the device once, where anything differs."""
+        `old`; `changes` is the difference from that scene to the batch's, whose tables are of `paired_tables`
+        with `old`. Returns how many partners there are. It waits for the device once, where anything
+        differs."""
         assert buffers.stride >= batch.path_count, "pairs need room for each path of the path buffer"
+        assert old.light_count == batch.tables.light_count, "both scenes choose among the same lights"
         if changes.is_empty:
             self.tracer.trace(batch)
             self._device.fill(buffers.partner_place, layout.NO_INDEX, 4 * batch.path_count)

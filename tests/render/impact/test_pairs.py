@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.pairs import check, session_of, traced_pairs
+from support.renders import assert_same_mean, repeat
 from support.small_scenes import mixed_scene
 
 from incpt.benchmarks.kit.scenes import cornell, crowd, glass, icosphere, wavy_sphere
@@ -24,8 +25,10 @@ from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
+from incpt.tables import lights
 from incpt.tables.change_tables import change_tables
-from incpt.tables.scene_tables import tables_of
+from incpt.tables.geometry_pool import GeometryPool
+from incpt.tables.scene_tables import paired_tables, tables_of
 
 _DEVICE = Device()
 SMALL = RenderSettings(size=(44, 28), tile_size=8, max_bounces=3)
@@ -138,6 +141,29 @@ EDITS = [
     Edit("other glass", nested, lambda s: s.with_object("inner", material="frosted"), 0.5),
     Edit("stone", nested, lambda s: s.with_object("stone", rotation=(0, 40, 0)), 0.5),
     Edit("frosted", nested, lambda s: s.with_material("frosted", roughness=0.6), 0.5),
+    Edit("glow", mixed, lambda s: s.with_material("red", emission=(2, 1, 0.5))),
+    Edit("fade", lambda: mixed().with_material("red", emission=(2, 1, 0.5)),
+         lambda s: s.with_material("red", emission=(0, 0, 0))),
+    Edit("dim", mixed, lambda s: s.with_material("lamp", emission=(3, 3, 6))),
+    Edit("lamp moves", mixed, lambda s: s.with_object("lamp", position=(0.5, 2.2, 0), rotation=(160, 0, 20))),
+    Edit("lamp goes", mixed, lambda s: s.without_object("lamp")),
+    Edit("lamp comes", mixed, lambda s: s.with_added(
+        Object("new", shape("plane"), "lamp", (2, 1, 1), (0, 0, 90), (0.5, 1, 0.5)))),
+    Edit("lamp grows", mixed, lambda s: s.with_object("lamp", scale=(1.5, 1, 1.2))),
+    Edit("lamp hides", mixed, lambda s: s.with_object("lamp", visible=False)),
+    Edit("lamp bends", mixed, lambda s: s.with_object("lamp", mesh=bent(shape("cube")), scale=(1, 0.1, 1))),
+    Edit("lamp turns to glass", mixed, lambda s: s.with_object("lamp", material="glass")),
+    Edit("both sides", lambda: mixed().with_object("lamp", position=(2, 1, 0.5), rotation=(0, 0, -90)),
+         lambda s: s.with_material("lamp", double_sided=True)),
+    Edit("one pane", blocks_in_a_box, lambda s: s.with_object("lamp 2", position=(-0.3, 1.99, -0.4))),
+    Edit("pane and block", blocks_in_a_box, lambda s: s.with_object(
+        "lamp 1", scale=(0.3, 1, 0.2)).with_object("short", position=(0.3, 0.3, 0.4))),
+    Edit("first lamp", lambda: blocks_in_a_box().with_material("lamp", emission=(0, 0, 0)),
+         lambda s: s.with_material("lamp", emission=(17, 12, 4))),
+    Edit("lamp over glass", nested, lambda s: s.with_object("lamp", position=(0.5, 2.5, 0.5))),
+    Edit("glass glows", nested, lambda s: s.with_material("partly", emission=(0, 1, 2))),
+    Edit("other lamps", mixed, lambda s: s.with_material("second", emission=(1, 2, 8)).with_object(
+        "lamp", material="second").with_object("red cube", position=(0, 0.6, 0))),
     Edit("partly", nested, lambda s: s.with_material("partly", transmission=0.8), 0.5),
 ]  # fmt: skip
 
@@ -200,6 +226,47 @@ def test_equal_scenes_have_no_partners(in_blocks: bool, device: Device) -> None:
         new = other.with_object("red cube", position=(1, 1, 1)) if hidden else other
         pairs = traced_pairs(device, other if hidden else old, new, in_blocks, spp=2)
         check(pairs, at_most=0.0, differs=False)
+
+
+def metal_in_a_box() -> Scene:
+    """A glossy block beside the lamps, so that both techniques of multiple importance sampling count."""
+    scene = sized(cornell())
+    steel = Material((0.9, 0.9, 0.9), metallic=1.0, roughness=0.35)
+    return replace(scene, materials={**scene.materials, "white": steel})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "edit",
+    [
+        Edit("lamp grows", metal_in_a_box, lambda s: s.with_object("lamp 1", scale=(0.6, 1, 0.5))),
+        Edit("lamp dims", metal_in_a_box, lambda s: s.with_material("dim", emission=(2, 3, 1)).with_object(
+            "lamp 1", material="dim")),
+        Edit("wall glows", metal_in_a_box, lambda s: s.with_material("red", emission=(1.5, 0.4, 0.3))),
+        Edit("lamp goes", metal_in_a_box, lambda s: s.without_object("lamp 0")),
+        Edit("other lamp", mixed, lambda s: s.with_material("second", emission=(3, 4, 8)).with_object(
+            "lamp", material="second")),
+    ],
+    ids=lambda edit: edit.name,
+)  # fmt: skip
+def test_lights_of_two_scenes_bring_what_those_of_each_bring(
+    edit: Edit, device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Choosing among the lights of both scenes changes no mean, in either of them."""
+    old = edit.scene()
+    new = edit.apply(old)
+    pool = GeometryPool.of(device)
+    differs = False
+    for chosen, scene in enumerate((old, new)):
+        plain = repeat(scene, 256, max_bounces=2)
+        tables = paired_tables(pool, old, new)
+        assert tables[chosen].lights.count >= len(lights.emissive_objects(scene))
+        with monkeypatch.context() as patch:
+            patch.setattr("incpt.render.session.tables_of", lambda *_, both=tables, i=chosen: both[i])
+            paired = repeat(scene, 256, max_bounces=2)
+        assert_same_mean(plain, paired)
+        differs |= bool((plain != paired).any())
+    assert differs  # in one of the scenes at least others are chosen
 
 
 def far(scene: Scene, offset: tuple[float, float, float]) -> Scene:
@@ -281,6 +348,8 @@ def test_kernels_of_pairs_are_built_ahead(
     assert pair_tracer.trace(batch, tables, changes, buffers) > 0
 
 
+Place = tuple[float, float, float]
+
 _NUMBERS = st.floats(-1.0, 1.0, width=32)
 _PLACES = st.tuples(_NUMBERS, _NUMBERS, _NUMBERS)
 
@@ -312,40 +381,36 @@ def small_scenes(draw: st.DrawFn) -> Scene:
     return replace(scene, materials=materials, objects=(*scene.objects, *bodies), settings=settings)
 
 
+BODY_EDITS: dict[str, Callable[[Scene, Object, int, float, Place], Scene]] = {
+    "move": lambda s, body, n, x, p: s.with_object(body.name, position=(0.5 * p[0], 1 + 0.5 * x, 0.5 * p[2])),
+    "turn": lambda s, body, n, x, p: s.with_object(body.name, rotation=(180 * p[0], 180 * p[1], 180 * p[2])),
+    "hide": lambda s, body, n, x, p: s.with_object(body.name, visible=not body.visible),
+    "remove": lambda s, body, n, x, p: s.without_object(body.name),
+    "copy": lambda s, body, n, x, p: s.with_added(
+        replace(body, name=f"body {len(s.objects)}", position=(p[0], 1.2, p[2]))
+    ),
+    "assign": lambda s, body, n, x, p: s.with_object(body.name, material=("glass", "metal", "green")[n % 3]),
+    "colour": lambda s, body, n, x, p: s.with_material(body.material, base_color=(x, 0.5, 1 - x)),
+    "glow": lambda s, body, n, x, p: s.with_material(body.material, emission=(n, x, 1)),
+    "swap": lambda s, body, n, x, p: s.with_object(body.name, mesh=bent(body.mesh)),
+    "wall": lambda s, body, n, x, p: s.with_object("left", position=(-1 - 0.2 * x, 1, 0)),
+    "lamp": lambda s, body, n, x, p: s.with_object(f"lamp {n}", position=(p[0], 1.5, p[2])),
+    "pane": lambda s, body, n, x, p: s.with_object(f"lamp {n}", material=("white", "lamp")[x < 0.3]),
+}
+"""What people do to a scene: to a body, number `n`, by an amount `x`, at a place `p`."""
+
+
 @st.composite
 def edits(draw: st.DrawFn) -> Callable[[Scene], Scene]:
-    """One of the things that people do to a scene."""
-    kind = draw(
-        st.sampled_from(["move", "turn", "hide", "remove", "copy", "assign", "colour", "swap", "wall"])
-    )
-    number, place = draw(st.integers(0, 3)), draw(_PLACES)
+    """One of the things that people do to a scene; nothing where it has no body left."""
+    kind, number, place = draw(st.sampled_from(list(BODY_EDITS))), draw(st.integers(0, 3)), draw(_PLACES)
     amount = draw(st.floats(0.05, 0.95))
 
     def apply(scene: Scene) -> Scene:
         bodies = [obj for obj in scene.objects if obj.name.startswith("body")]
-        if not bodies or kind == "wall":
-            return scene.with_object("left", position=(-1 - 0.2 * amount, 1, 0))
-        body = bodies[number % len(bodies)]
-        match kind:
-            case "move":
-                return scene.with_object(
-                    body.name, position=tuple(0.5 * p + (0, 1, 0)[i] for i, p in enumerate(place))
-                )
-            case "turn":
-                return scene.with_object(body.name, rotation=tuple(180 * p for p in place))
-            case "hide":
-                return scene.with_object(body.name, visible=not body.visible)
-            case "remove":
-                return scene.without_object(body.name)
-            case "copy":
-                copy = replace(body, name=f"body {len(scene.objects)}", position=(place[0], 1.2, place[2]))
-                return scene.with_added(copy)
-            case "assign":
-                return scene.with_object(body.name, material=("glass", "metal", "green")[number % 3])
-            case "colour":
-                return scene.with_material(body.material, base_color=(amount, 0.5, 1 - amount))
-            case _:
-                return scene.with_object(body.name, mesh=bent(body.mesh))
+        if not bodies:
+            return scene
+        return BODY_EDITS[kind](scene, bodies[number % len(bodies)], number, amount, place)
 
     return apply
 
