@@ -50,12 +50,15 @@ typedef struct {
     Subset misses, surfaces, media;
 } BlockRay;
 
-// Starts the paths of a block.
+// Starts the paths of a block. With params.listed their places stand in a list.
 STAGE void start_paths(const Block *block) {
     const uint first = block->first, size = block->size;
+    __local uint *list = UINT_PLANES(block->memory, LIST);
+    for (uint i = 0; i < size; i++)
+        list[i] = block->params->listed ? block->places[first + i] : first + i;
     LANES
     for (int i = 0; i < (int)size; i++) {
-        generate_path(block->params, block->slots, block->places, &block->state, i, first + i);
+        generate_path(block->params, block->slots, &block->state, i, list[i]);
         store_result(&block->state, i, i);
         store3(block->state.radiance, BLOCK_STRIDE, i, vec3(0.0f, 0.0f, 0.0f));
     }

@@ -3,13 +3,10 @@
 #include "path/state.cl"
 #include "path/tile.cl"
 
-// Starts the path number `k` of a launch: the slot, the pixel and the sample index that the plan gives to its
-// place among the paths of all slots, and its camera ray. With params.listed that place stands in a list.
-// Paths of a group of slots go pixel by pixel with the repetitions innermost.
-INLINE void generate_path(const Params *params, __global const Slot *slots, __global const uint *places,
-                          const State *state, uint path, uint k) {
-    uint listed = places[params->listed ? k : 0u];
-    uint place = params->listed ? listed : k;
+// Starts a path: the slot, the pixel and the sample index that the plan gives to its place among the paths of
+// all slots, and its camera ray. Paths of a group of slots go pixel by pixel with the repetitions innermost.
+INLINE void generate_path(const Params *params, __global const Slot *slots, const State *state, uint path,
+                          uint place) {
     uint tile_pixels = params->tile_size * params->tile_size;
     __global const Slot *slot = &slots[quotient(place, tile_pixels)];
     uint group_count = slot->group_count;
@@ -44,13 +41,15 @@ INLINE void generate_path(const Params *params, __global const Slot *slots, __gl
 }
 
 #ifndef BLOCKS
-// Starts the paths of a chunk.
+// Starts the paths of a chunk. With params.listed their places stand in a list.
 __kernel void generate(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, PLACES_PARAMETERS, PATH_STATE_PARAMETERS) {
     const State state = STATE_OF(params);
     uint k = (uint)get_global_id(0);
     int started = k < params.path_count;
-    uint result = started ? params.first_path + k : state.radiance_stride - 1u;
-    generate_path(&params, slots, places, &state, started ? k : state.stride - 1u, started ? result : 0u);
+    uint number = params.first_path + (started ? k : 0u),
+         result = started ? number : state.radiance_stride - 1u;
+    uint listed = places[params.listed ? number : 0u];
+    generate_path(&params, slots, &state, started ? k : state.stride - 1u, params.listed ? listed : number);
     store3(radiance, state.radiance_stride, result, vec3(0.0f, 0.0f, 0.0f));
 }
 #endif
