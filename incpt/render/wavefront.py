@@ -72,6 +72,12 @@ class _Chunk:
     launches: tuple[_StageLaunch, ...]
 
     @property
+    def has_other_lights(self) -> bool:
+        """Whether it is asked of paths whether they meet changes, and lights are among them."""
+        test = self.batch.touch_test
+        return test is not None and test.changes.difference.lights
+
+    @property
     def size(self) -> int:
         return int(self.params["path_count"])
 
@@ -174,10 +180,8 @@ class Wavefront:
 
     def _trace_ray(self, chunk: _Chunk, ray: int, bound: int) -> None:
         """Ray number `ray` of every live path, which are `bound` at most."""
-        test = chunk.batch.touch_test
-        has_changed_lights = test is not None and bool(test.changes.change["has_lights"])
-        sees_sky = bool(chunk.params["sees_sky"])
-        holds = holding(ray, int(chunk.params["last_ray"]), sees_sky, has_changed_lights)
+        last, sees_sky = int(chunk.params["last_ray"]), bool(chunk.params["sees_sky"])
+        holds = holding(ray, last, sees_sky, chunk.has_other_lights)
         for one in chunk.launches:
             stage = one.stage
             if stage.when in holds:

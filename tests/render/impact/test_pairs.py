@@ -28,7 +28,7 @@ from incpt.scene.shapes import shape
 from incpt.tables import lights
 from incpt.tables.change_tables import change_tables
 from incpt.tables.geometry_pool import GeometryPool
-from incpt.tables.scene_tables import paired_tables, tables_of
+from incpt.tables.scene_tables import paired_tables
 
 _DEVICE = Device()
 SMALL = RenderSettings(size=(44, 28), tile_size=8, max_bounces=3)
@@ -330,13 +330,11 @@ def test_kernels_of_pairs_are_built_ahead(
 ) -> None:
     """After the idle launches of pairs, an edit builds nothing, also with auxiliary images."""
     own = Device()
-    old = mixed()
-    new = EDITS[0].apply(old)
-    session = session_of(own, replace(new, settings=replace(SMALL, aovs=True)), in_blocks)
-    batch = session._batch(session.progress.planned(session.grid.count).slots, session._state.path_buffer)
-    tables = tables_of(batch.tables.pool, old, batch.tables)
-    changes = change_tables(own, old, new)
-    buffers = PairBuffers.of(own, session._state.path_buffer.stride)
+    old = replace(mixed(), settings=replace(SMALL, aovs=True))
+    session = session_of(own, old, in_blocks)
+    path_buffer = session._state.path_buffer
+    batch = session._batch(session.progress.planned(session.grid.count).slots, path_buffer)
+    buffers = PairBuffers.of(own, path_buffer.stride)
     pair_tracer = PairTracer(session._tracer)
     for launch in pair_tracer.idle_launches(batch, buffers):
         launch()
@@ -344,8 +342,12 @@ def test_kernels_of_pairs_are_built_ahead(
     def fail(*_: object) -> None:
         raise AssertionError("a kernel is built while somebody waits")
 
+    edited = [edit.apply(old) for edit in EDITS if edit.name in ("move", "recolour", "lamp moves", "glow")]
+    pairs = [paired_tables(batch.tables.pool, old, new, batch.tables) for new in edited]
     monkeypatch.setattr(own, "build", fail)
-    assert pair_tracer.trace(batch, tables, changes, buffers) > 0
+    for before, after in pairs:
+        changes = change_tables(own, before.scene, after.scene)
+        assert pair_tracer.trace(replace(batch, tables=after), before, changes, buffers) > 0
 
 
 Place = tuple[float, float, float]
