@@ -20,7 +20,7 @@ from incpt.render.tiles import TileGrid
 from incpt.render.tracer import Tracer
 from incpt.scene.model import Scene
 from incpt.tables.change_tables import ChangeTables, change_tables
-from incpt.tables.scene_tables import SceneTables, tables_of
+from incpt.tables.scene_tables import SceneTables, paired_tables
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +85,7 @@ def compared(
     grid = TileGrid(*settings.size, settings.tile_size)
     if before is not None and before.compares(anchor.scene, scene) and before.grid == grid:
         return before
-    old = tables_of(pool, anchor.scene, tables)
-    new = tables_of(pool, scene, tables)
+    old, new = paired_tables(pool, anchor.scene, scene, tables)
     known = () if before is None or before.grid != grid else (before.anchor_hits, before.hits)
     found = [hits for hits in known if hits.scene is anchor.scene]
     anchor_hits = found[0] if found else center_hits(tracer, old, settings)
