@@ -16,7 +16,7 @@ typedef struct {
     __global const uint *places;
     __global float *path_buffer;
     const Changes *changes; // `touched` begins with the first path of the block
-    uint first, size; // the place of its first path in the path buffer, and how many paths it has
+    uint first, size;       // the place of its first path in the path buffer, and how many paths it has
     Geometry geometry;
     Shading shading;
     Emitters emitters;

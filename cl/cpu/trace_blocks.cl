@@ -225,6 +225,19 @@ STAGE void write_aovs(const Block *block, const BlockRay *ray) {
 }
 #endif
 
+#if defined(CHANGES) && defined(TRIANGLE_LIGHTS)
+// As touch_rays, of the lights that paths ask for, before they are shaded.
+STAGE void touch_lights(const Block *block, const BlockRay *ray) {
+    const State *state = &block->state;
+    const Changes *changes = block->changes;
+    const uint count = ray->count;
+    LANES
+    for (int i = 0; i < (int)count; i++)
+        touch(changes, load_result(state, i),
+              asks_for_changed_light(block->params, &block->shading, &block->emitters, state, i));
+}
+#endif
+
 #ifdef MEDIA
 // Shades the paths that have met a medium or are inside of one. Those that turn out to stand on an opaque
 // surface are shaded as such. Lights are sampled for those that need it: at a smooth boundary none do, so
@@ -282,19 +295,6 @@ STAGE void finish_paths(const Block *block, BlockRay *ray) {
     for (int i = 0; i < (int)count; i++)
         finish_path(&block->shading, &block->state, i, load_result(&block->state, i));
     ray->count = 0;
-}
-#endif
-
-#if defined(CHANGES) && defined(TRIANGLE_LIGHTS)
-// As touch_rays, of the lights that paths ask for, before they are shaded.
-STAGE void touch_lights(const Block *block, const BlockRay *ray) {
-    const State *state = &block->state;
-    const Changes *changes = block->changes;
-    const uint count = ray->count;
-    LANES
-    for (int i = 0; i < (int)count; i++)
-        touch(changes, load_result(state, i),
-              asks_for_changed_light(block->params, &block->shading, &block->emitters, state, i));
 }
 #endif
 

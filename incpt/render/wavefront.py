@@ -44,6 +44,7 @@ _LIGHTS = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS")
 _FEATURES: Mapping[str | None, tuple[str, ...]] = {
     "shade_miss": (*_LIGHTS, "MEDIA"),
     "sample_lights": _LIGHTS,
+    "touch_lights": _LIGHTS,
     "shade_medium": _LIGHTS,
     "shade": _LIGHTS,
 }

@@ -32,6 +32,11 @@ def test_what_there_is_not_is_left_out() -> None:
     assert kernels_on(("CHANGES",), holding(1, 5, sees_sky=False)) == ["intersect", "touch_rays", "shade"]
     assert kernels_on(("AOVS",), holding(1, 5, sees_sky=True)) == ["intersect", "shade_miss", "shade"]
     lit = ("TRIANGLE_LIGHTS",)
+    changed = holding(1, 5, sees_sky=False, has_changed_lights=True)
+    assert "touch_lights" in kernels_on((*lit, "CHANGES"), changed)
+    assert "touch_lights" not in kernels_on((*lit, "CHANGES"), holding(1, 5, False))
+    assert "touch_lights" not in kernels_on(("ENVIRONMENT_IMAGE", "CHANGES"), changed)
+    assert kernels_on(lit, changed) == kernels_on(lit, holding(1, 5, False))
     assert kernels_on(lit, holding(1, 5, False)) == ["intersect", "sample_lights", "shade", "trace_shadow"]
 
 
@@ -61,7 +66,9 @@ def test_lists_are_complete_before_the_last_stage_that_reads_them(features: tupl
 
 @pytest.mark.parametrize("features", VARIANTS, ids=lambda features: " ".join(features) or "plain")
 def test_features_leave_no_condition_of_theirs(features: tuple[str, ...]) -> None:
-    asked = When.SKY | When.CAMERA_RAY | (When(0) if "MEDIA" in features else When.GOES_ON | When.ENDS)
+    asked = When.SKY | When.CHANGED_LIGHTS | When.CAMERA_RAY
+    if "MEDIA" not in features:
+        asked |= When.GOES_ON | When.ENDS
     assert all(stage.when in asked for stage in stages_of(features))
 
 

@@ -154,7 +154,7 @@ def _samples_at(tiles: TileVariances, gain: float) -> FloatArray:
         middle = 0.5 * (low + high)
         too_few = tiles.gain(middle) > gain
         low, high = np.where(too_few, middle, low), np.where(too_few, high, middle)
-    return 0.5 * (low + high)
+    return np.asarray(0.5 * (low + high))
 
 
 def _smoothed(values: FloatArray, columns: int) -> FloatArray:
