@@ -224,7 +224,7 @@ def test_sweep_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture
     assert {"machine", "driver", "tile_size", "seed", "normalized_rmse", "busy"} <= set(header.split(","))
 
     assert main.main(command) == 0  # nothing is left to do
-    assert "4 of 4 measurements were there" in capsys.readouterr().err
+    assert "6 of 6 measurements were there" in capsys.readouterr().err
     assert len(read(tmp_path / "out" / "sweep.jsonl").records) == 4
 
 
