@@ -25,7 +25,7 @@
 #include "path/write_aovs.cl"
 #endif
 #ifdef CHANGES
-#include "path/changes.cl"
+#include "path/touch_lights.cl"
 #endif
 #ifdef BRUTE_FORCE
 #include "cpu/brute_force.cl"

@@ -1,5 +1,4 @@
 #include "path/state.cl"
-#include "scene/light.cl"
 
 // Which paths meet something that differs between two scenes. A path that meets nothing of it brings the same
 // in both, to the bit: it is traced in one of them only.
@@ -53,21 +52,6 @@ INLINE uint is_changed(const Changes *changes, uint object) {
     return changes->changed_objects[hit ? object : 0u] & hit;
 }
 
-// 1 where a path that has hit a surface asks for a light that differs. This is asked before the path is
-// shaded.
-INLINE uint asks_for_changed_light(const Params *params, const Shading *shading, const Emitters *emitters,
-                                   const State *state, uint path) {
-    Path p = load_path(state, path);
-    __global const Material *material = &shading->materials[load_surface(state, path).material];
-    uint seed = pixel_seed(p.pixel, params->seed);
-    float choice = uniform_2d(seed, p.sample, PAIR_CHOICE(p.ray)).v;
-    // As in shade_medium: only smooth boundaries need no light.
-    int opaque = uniform_2d(seed, p.sample, PAIR_LUCK(p.ray)).v >= material->transmission;
-    int rough = material->roughness * material->roughness > MIN_ALPHA;
-    int asks = (p.bounces <= params->max_bounces) & (opaque | rough);
-    return chooses_changed_light(params, emitters, choice) & (uint)asks;
-}
-
 // Notes of the path at `place` that it has met something that changed, if `met` is 1.
 INLINE void touch(const Changes *changes, uint place, uint met) { changes->touched[place] |= met; }
 
@@ -105,20 +89,4 @@ __kernel void touch_shadow_rays(LAUNCH_PARAMETERS, LIST_PARAMETERS, PATH_STATE_P
           crosses_any_box(&changes.change, load_ray(shadows, state.stride, path),
                           shadows[SHADOW_DISTANCE * state.stride + path]));
 }
-
-#ifdef TRIANGLE_LIGHTS
-// For paths that have hit a surface and are not shaded yet.
-__kernel void touch_lights(LAUNCH_PARAMETERS, LIST_PARAMETERS, SHADING_PARAMETERS, EMITTERS_PARAMETERS,
-                           PATH_STATE_PARAMETERS, CHANGES_PARAMETERS) {
-    if (get_global_id(0) >= lengths[length_place])
-        return;
-    const uint path = list[get_global_id(0)];
-    const State state = STATE_OF(params);
-    const Shading shading = {SHADING_ARGUMENTS};
-    const Emitters emitters = {EMITTERS_ARGUMENTS};
-    const Changes changes = {CHANGES_ARGUMENTS};
-    touch(&changes, params.first_path + path,
-          asks_for_changed_light(&params, &shading, &emitters, &state, path));
-}
-#endif
 #endif

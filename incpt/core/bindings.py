@@ -486,7 +486,6 @@ KERNELS: dict[str, tuple[Group, ...]] = {
 
 FILES = {
     "touch_rays": "changes",
-    "touch_lights": "changes",
     "touch_shadow_rays": "changes",
     "count_partners": "partners",
     "list_partners": "partners",

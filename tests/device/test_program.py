@@ -10,7 +10,7 @@ import pytest
 from incpt.device import program
 from incpt.device.device import Device
 
-FLOORS = ({"base"}, {"scene", "shading"}, {"accel"}, {"path"}, {"cpu", "film", "impact"})
+FLOORS = ({"base"}, {"scene", "shading"}, {"accel"}, {"path"}, {"cpu", "film"}, {"impact"})
 """Folders of cl/ from the lowest: files include files of lower floors, and of their own folder."""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -64,8 +65,14 @@ def session_of(device: Device, scene: Scene, in_blocks: bool, spp: int = 1) -> S
     settings = replace(scene.settings, base_nor=spp, sample_rate=1, slots_per_step=None)
     session = Session(scene, settings=settings, device=device)
     if not in_blocks:
-        session._tracer = Wavefront(device)
+        session._tracer = _wavefront_of(device)
     return session
+
+
+@cache
+def _wavefront_of(device: Device) -> Wavefront:
+    """One for all tests: its state takes tens of megabytes."""
+    return Wavefront(device)
 
 
 def traced_pairs(
