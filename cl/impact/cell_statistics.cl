@@ -1,115 +1,189 @@
-#include "impact/columns.cl"
-#include "impact/guides.cl"
+#include "impact/cell.cl"
 #include "impact/pair.cl"
 
 // Statistics of pairs, pooled over the pixels of a cell that have one class:
 //
-//     cell_columns  sums over its columns, which sum_columns then adds up
-//     pool_cells    variances and covariance, from as many cells around as it takes
-//     mark_patches  where anything changes
+//     measure_cells  sums over cells
+//     pool_cells     variances and covariance, from as many cells around as it takes, and what follows from
+//     them spread_cells   interpolates along rows, see impact/cell.cl find_spans     where anything changes
 
-// `columns` has CELL_SUM_PLANES planes for each class, with a float for each column of each row of cells.
-__kernel WIDE void cell_columns(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PARAMETERS, COLUMNS_PARAMETERS) {
-    const Patch strip = strip_of(width, height, CELL_SIZE);
-    const size_t pixels = (size_t)width * height, plane = column_plane(width, height, CELL_SIZE);
-    for (size_t y = strip.top; y < strip.bottom; y++) {
-        const int begins = y == strip.top;
-        EACH_COLUMN(x, strip) {
-            const size_t pixel = y * width + x;
-            const Pair p = load_pair(pairs, pixels, pixel);
-            const Spread spread = spread_of(&p);
-            float values[CELL_SUM_PLANES];
-            values[CELL_SUM_FREEDOM_NEW] = spread.freedom_new;
-            values[CELL_SUM_SQUARES_NEW] = spread.squares_new;
-            values[CELL_SUM_FREEDOM_PAIRS] = spread.freedom_pairs;
-            values[CELL_SUM_SQUARES_OLD] = spread.squares_old;
-            values[CELL_SUM_PRODUCTS] = spread.products;
-            values[CELL_SUM_TOUCHED] = p.touched;
-            const int class = class_of(labels[pixel]);
-            __global float *column = columns + strip.index * width + x;
+// `cell_sums` has CellSum for each class.
+__kernel WIDE void measure_cells(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PARAMETERS,
+                                 CELL_SUMS_PARAMETERS) {
+    CELL_COLUMNS(columns, CLASSES * CELL_SUM_PLANES);
+    const Patch patch = patch_of(width, height, CELL_SIZE);
+    const size_t pixels = (size_t)width * height;
+    EACH_ROW(y, patch)
+    EACH_COLUMN(x, patch) {
+        const size_t pixel = y * width + x;
+        const Pair p = load_pair(pairs, pixels, pixel);
+        const Spread spread = spread_of(&p, anchor_sums[3u * pixels + pixel]);
+        float values[CELL_SUM_PLANES];
+        values[CELL_SUM_SAMPLES] = sample_count(&p);
+        values[CELL_SUM_PAIRS] = spread.pairs;
+        values[CELL_SUM_FREEDOM_NEW] = spread.freedom_new;
+        values[CELL_SUM_SQUARES_NEW] = spread.squares_new;
+        values[CELL_SUM_NEW_MOMENT] = p.new_moment;
+        values[CELL_SUM_SQUARES_OLD] = spread.squares_old;
+        values[CELL_SUM_PRODUCTS] = spread.products;
+        values[CELL_SUM_TOUCHED] = p.touched;
+        const ClassShares class = class_shares(labels[pixel]);
 #pragma unroll
-            for (uint i = 0u; i < CELL_SUM_PLANES; i++) {
-                add_to_column(&column[i * plane], begins, class ? 0.0f : values[i]);
-                add_to_column(&column[(CELL_SUM_PLANES + i) * plane], begins, class ? values[i] : 0.0f);
-            }
+        for (uint i = 0u; i < CELL_SUM_PLANES; i++) {
+            COLUMN(columns, i, x, patch) += class.first * values[i];
+            COLUMN(columns, CELL_SUM_PLANES + i, x, patch) += class.second * values[i];
         }
+    }
+    if (patch.top < height)
+        store_cell_sums(columns, CLASSES * CELL_SUM_PLANES, &patch, width, height, cell_sums);
+}
+
+// How many samples of unchanged objects are enough, and the cells that are looked at around one for want of
+// them. Objects that changed are small, and their samples differ by where they are less than from one sample
+// to the next, so that all around are taken always.
+#define ENOUGH_SAMPLES 300.0f
+
+// Variances below this are rounding, and tell nothing of a correlation.
+#define LEAST_VARIANCE 1e-8f
+// The weight of old values may be larger than that of new ones, but not by much, since it is estimated.
+#define MOST_OLD_WEIGHT 1.5f
+// Variances are mixed with a guess that counts as so many degrees of freedom. It keeps the first samples of
+// bright pixels from drowning others. Of unchanged objects it is relative to the square of the kept picture.
+#define PRIOR_FREEDOM 4.0f
+#define PRIOR_VARIANCE 0.5f
+
+// A cell and those around it: its own row and the two above and below, as far as there are any.
+typedef struct {
+    int columns;
+    int rows[5];     // where the rows begin
+    float counts[5]; // 1, or 0 where there is no such row
+} CellsAround;
+
+INLINE float cell_at(__global const float *sums, const CellsAround *around, int row, int column) {
+    const int is_there = (column >= 0) & (column < around->columns);
+    return (is_there ? sums[around->rows[row] + column] : 0.0f) * around->counts[row];
+}
+
+// Sums over a cell, over the eight around it, and over the sixteen around those.
+typedef struct {
+    float own, near, far;
+} Rings;
+
+INLINE Rings rings_of(__global const float *sums, const CellsAround *around, int column) {
+    Rings rings = {cell_at(sums, around, 2, column), 0.0f, 0.0f};
+#pragma unroll
+    for (int row = 0; row < 5; row++) {
+#pragma unroll
+        for (int dx = -2; dx <= 2; dx++) {
+            const int is_far = (row == 0) | (row == 4) | (dx == -2) | (dx == 2),
+                      is_own = (row == 2) & (dx == 0);
+            const float value = cell_at(sums, around, row, column + dx);
+            rings.near += is_far | is_own ? 0.0f : value;
+            rings.far += is_far ? value : 0.0f;
+        }
+    }
+    return rings;
+}
+
+INLINE void pool_cell(__global const float *sums, __global float *cells, __global float *rules, uint total,
+                      uint class, const CellsAround *around, int column) {
+    const Rings samples_around = rings_of(sums + CELL_SUM_SAMPLES * total, around, column);
+    const float near_samples = samples_around.own + samples_around.near;
+    const int takes_near = (class == 1u) | (samples_around.own < ENOUGH_SAMPLES);
+    const int takes_far = (class == 1u) | (near_samples < ENOUGH_SAMPLES);
+    float sum[CELL_SUM_PLANES];
+#pragma unroll
+    for (uint i = 0u; i < CELL_SUM_PLANES; i++) {
+        const Rings rings = rings_of(sums + i * total, around, column);
+        sum[i] = rings.own + (takes_near ? rings.near : 0.0f) + (takes_near & takes_far ? rings.far : 0.0f);
+    }
+
+    const float freedom = sum[CELL_SUM_FREEDOM_NEW], pairs = sum[CELL_SUM_PAIRS];
+    const float touched = sum[CELL_SUM_TOUCHED];
+    const float new_variance = sum[CELL_SUM_SQUARES_NEW] / MAX(freedom, 1.0f);
+    const float old_variance = sum[CELL_SUM_SQUARES_OLD] / MAX(pairs, 1.0f);
+    const float covariance = MAX(sum[CELL_SUM_PRODUCTS] / MAX(pairs, 1.0f), 0.0f);
+    const float new_moment = sum[CELL_SUM_NEW_MOMENT] / MAX(sum[CELL_SUM_SAMPLES], 1.0f);
+    __global float *known = cells + class * CELL_PLANES * total + around->rows[2] + column;
+    known[CELL_NEW_VARIANCE * total] = new_variance;
+    known[CELL_OLD_VARIANCE * total] = old_variance;
+    known[CELL_COVARIANCE * total] = covariance;
+    known[CELL_NEW_MOMENT * total] = new_moment;
+    known[CELL_FREEDOM_NEW * total] = freedom;
+    known[CELL_PAIRS * total] = pairs;
+    known[CELL_TOUCHED * total] = touched;
+
+    // Where nothing is known of old values, they count as new ones do.
+    const float fitting = (covariance + LEAST_VARIANCE) / (old_variance + LEAST_VARIANCE);
+    const float old_weight = pairs > 0.0f ? MIN(fitting, MOST_OLD_WEIGHT) : 1.0f;
+    // What an object looked like before it changed is a good guess for its looks only if its samples go
+    // together with the old ones: what moved has other surfaces in its place.
+    const float resemblance = CLAMP(1.5f * old_weight - 0.5f, 0.0f, 1.0f);
+    const float known_share = freedom / (freedom + PRIOR_FREEDOM);
+    __global float *rule = rules + class * total + around->rows[2] + column;
+    const uint next = CLASSES * total;
+    rule[RULE_OLD_WEIGHT * next] = old_weight;
+    rule[RULE_BASE_SHARE * next] = class == 1u && touched > 0.0f ? resemblance : 1.0f;
+    rule[RULE_VARIANCE * next] =
+        known_share * new_variance + (class == 1u ? (1.0f - known_share) * new_moment : 0.0f);
+    rule[RULE_PRIOR * next] = class == 1u ? 0.0f : (1.0f - known_share) * PRIOR_VARIANCE;
+    rule[RULE_COVERED * next] = known_share * (2.0f * covariance - old_weight * old_variance);
+}
+
+// Goes over each class of each row of cells. `rules` has RulePlane for each class.
+__kernel WIDE void pool_cells(PICTURE_PARAMETERS, CELL_SUMS_PARAMETERS, CELLS_PARAMETERS, RULES_PARAMETERS) {
+    const uint rows = cell_rows(height), total = cell_count(width, height);
+    const Patch patch = patch_of(cell_columns(width), CLASSES * rows, 1u);
+    EACH_ROW(y, patch) {
+        const uint class = (uint)y / MAX(rows, 1u);
+        const int row = (int)((uint)y % MAX(rows, 1u));
+        CellsAround around;
+        around.columns = (int)cell_columns(width);
+        for (int i = 0; i < 5; i++) {
+            const int there = row + i - 2, is_there = (there >= 0) & (there < (int)rows);
+            around.rows[i] = (is_there ? there : row) * around.columns;
+            around.counts[i] = is_there ? 1.0f : 0.0f;
+        }
+        __global const float *sums = cell_sums + class * CELL_SUM_PLANES * total;
+        EACH_PIXEL(x, patch)
+        pool_cell(sums, cells, rules, total, class, &around, (int)x);
     }
 }
 
-// How many degrees of freedom are enough, and the cells that are looked at around one for want of them.
-#define ENOUGH_FREEDOM 300.0f
-#define MOST_CELLS_AROUND 2
-
-// Sums of one kind over the cells up to `around` from a place.
-INLINE float cells_around(__global const float *sums, int columns, int rows, int column, int row,
-                          int around) {
-    float sum = 0.0f;
-    for (int y = MAX(row - around, 0); y <= MIN(row + around, rows - 1); y++)
-        for (int x = MAX(column - around, 0); x <= MIN(column + around, columns - 1); x++)
-            sum += sums[y * columns + x];
-    return sum;
+// Interpolates `plane_total` planes along the rows of cells: a float for each column of pixels.
+__kernel WIDE void spread_cells(PICTURE_PARAMETERS, SPREADING_PARAMETERS) {
+    const int columns = cell_columns(width), rows = cell_rows(height);
+    const Patch patch = patch_of(width, plane_total * rows, 1u);
+    EACH_ROW(y, patch)
+    EACH_COLUMN(x, patch) {
+        const float at = ((float)(int)x + 0.5f) * (1.0f / CELL_SIZE) - 0.5f;
+        const int left = (int)FLOOR(at);
+        const float first = cell_values[(int)y * columns + CLAMP(left, 0, columns - 1)];
+        const float second = cell_values[(int)y * columns + CLAMP(left + 1, 0, columns - 1)];
+        column_values[y * width + x] = first + (at - (float)left) * (second - first);
+    }
 }
 
-// A work-item for each class of each cell.
-__kernel void pool_cells(PICTURE_PARAMETERS, CELLS_PARAMETERS) {
-    uint total = cell_count(width, height);
-    uint class = (uint)get_global_id(0) / total, cell = (uint)get_global_id(0) % total;
-    if (class > 1u)
-        return;
-    int columns = cells_in_row(width), rows = total / columns;
-    int column = cell % columns, row = cell / columns;
-    __global const float *sums = cell_sums + class * CELL_SUM_PLANES * total;
-    int around = 0;
-    float freedom = sums[CELL_SUM_FREEDOM_NEW * total + cell];
-    while (freedom < ENOUGH_FREEDOM && around < MOST_CELLS_AROUND)
-        freedom = cells_around(sums + CELL_SUM_FREEDOM_NEW * total, columns, rows, column, row, ++around);
-    float sum[CELL_SUM_PLANES];
-    for (uint i = 0u; i < CELL_SUM_PLANES; i++)
-        sum[i] = cells_around(sums + i * total, columns, rows, column, row, around);
-
-    float per_pair = 1.0f / MAX(sum[CELL_SUM_FREEDOM_PAIRS], 1.0f);
-    float new_variance = sum[CELL_SUM_SQUARES_NEW] / MAX(freedom, 1.0f);
-    float old_variance = sum[CELL_SUM_SQUARES_OLD] * per_pair;
-    float most = SQRT(new_variance * old_variance);
-    __global float *known = cells + class * CELL_PLANES * total + cell;
-    known[CELL_NEW_VARIANCE * total] = new_variance;
-    known[CELL_OLD_VARIANCE * total] = old_variance;
-    known[CELL_COVARIANCE * total] = CLAMP(sum[CELL_SUM_PRODUCTS] * per_pair, 0.0f, most);
-    known[CELL_FREEDOM_NEW * total] = freedom;
-    known[CELL_FREEDOM_PAIRS * total] = sum[CELL_SUM_FREEDOM_PAIRS];
-    known[CELL_TOUCHED * total] = sum[CELL_SUM_TOUCHED];
-}
-
-// Whether a sample that met a change is behind what is known of a cell.
-INLINE int is_changed(__global const float *cells, uint total, uint cell) {
-    return (cells[CELL_TOUCHED * total + cell] > 0.0f) |
-           (cells[(CELL_PLANES + CELL_TOUCHED) * total + cell] > 0.0f);
-}
-
-// Whether any cell is changed that is nearer than `distance` pixels to a patch.
-INLINE int is_near_change(__global const float *cells, uint width, uint height, const Patch *patch,
-                          int distance) {
-    int columns = cells_in_row(width), rows = (height + CELL_SIZE - 1u) / CELL_SIZE;
-    int around = distance / CELL_SIZE;
-    int left = MAX((int)(patch->left / CELL_SIZE) - around, 0),
-        top = MAX((int)(patch->top / CELL_SIZE) - around, 0);
-    int right = MIN((int)((patch->right - 1u) / CELL_SIZE) + around, columns - 1);
-    int bottom = MIN((int)((patch->bottom - 1u) / CELL_SIZE) + around, rows - 1);
-    for (int row = top; row <= bottom; row++)
-        for (int column = left; column <= right; column++)
-            if (is_changed(cells, columns * rows, row * columns + column))
-                return 1;
-    return 0;
-}
-
-// A work-item for each patch. A change is spread over 1 + 2 + 4 + 8 pixels at most, and what it is told from
-// noise by over 16 more; see impact/shrinkage.cl.
-__kernel void mark_patches(PICTURE_PARAMETERS, CELLS_PARAMETERS, ACTIVITIES_PARAMETERS) {
-    uint index = (uint)get_global_id(0);
-    const Patch patch = patch_at(width, height, index);
+// A work-item for each patch: its columns from the first to the last near which a sample met a change. A
+// change is spread over 1 + 2 + 4 + 8 pixels, and depends on weights as far away again: four cells.
+__kernel void find_spans(PICTURE_PARAMETERS, CELLS_PARAMETERS, SPANS_PARAMETERS) {
+    const Patch patch = patch_at(width, height, CELL_SIZE, (uint)get_global_id(0));
     if (patch.top >= height)
         return;
-    activities[index] = is_near_change(cells, width, height, &patch, FIELD_MARGIN)       ? ACTIVITY_CHANGED
-                        : is_near_change(cells, width, height, &patch, 2 * FIELD_MARGIN) ? ACTIVITY_NEAR
-                                                                                         : ACTIVITY_IDLE;
+    const int around = 4, columns = cell_columns(width), rows = cell_rows(height), total = columns * rows;
+    const int left = MAX((int)(patch.left / CELL_SIZE) - around, 0);
+    const int right = MIN((int)((patch.right - 1u) / CELL_SIZE) + around, columns - 1);
+    const int top = MAX((int)patch.row - around, 0), bottom = MIN((int)patch.row + around, rows - 1);
+    int first = columns, last = -1;
+    for (int row = top; row <= bottom; row++)
+        for (int column = left; column <= right; column++) {
+            __global const float *cell = cells + CELL_TOUCHED * total + row * columns + column;
+            const int changed = cell[0] + cell[CELL_PLANES * total] > 0.0f;
+            first = changed ? MIN(first, column) : first;
+            last = changed ? MAX(last, column) : last;
+        }
+    const int from = MAX((first - around) * (int)CELL_SIZE, (int)patch.left);
+    const int to = MIN((last + around + 1) * (int)CELL_SIZE, (int)patch.right);
+    spans[2u * patch.index] = last < 0 ? (uint)patch.right : (uint)from;
+    spans[2u * patch.index + 1u] = last < 0 ? (uint)patch.right : (uint)to;
 }

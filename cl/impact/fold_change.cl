@@ -3,12 +3,16 @@
 
 // The number of samples that a changed pixel is worth: its uncorrelated share started with the new samples,
 // the correlated share goes on from those that were kept. 1 / worth is the variance over that of a sample.
-INLINE float worth_of(const Pair *p, const Anchor *anchor, const Known *known) {
+INLINE float worth_of(const Pair *p, const Anchor *anchor, __global const float *known, uint total) {
     const float samples = sample_count(p), refined = anchor->samples + pair_count(p);
-    const float variances = known->new_variance * known->old_variance;
-    const int unknown = (known->freedom_pairs < 0.5f) | !(variances > 0.0f);
-    const float correlation2 = unknown ? 0.0f : known->covariance * known->covariance / variances;
-    const float kept_share = known->touched > 0.0f ? MIN(correlation2, 1.0f) : 1.0f;
+    const float freedom = known[CELL_FREEDOM_NEW * total];
+    // The mean square of the difference from the kept picture is what the variance is at most.
+    const float new_variance =
+        (freedom * known[CELL_NEW_VARIANCE * total] + known[CELL_NEW_MOMENT * total]) / (freedom + 1.0f);
+    const float variances = new_variance * known[CELL_OLD_VARIANCE * total];
+    const float covariance = known[CELL_COVARIANCE * total];
+    const float correlation2 = variances > 0.0f ? MIN(covariance * covariance / variances, 1.0f) : 0.0f;
+    const float kept_share = known[CELL_TOUCHED * total] > 0.0f ? correlation2 : 1.0f;
     const float per_worth = (1.0f - kept_share) / MAX(samples, 1.0f) + kept_share / MAX(refined, 1e-20f);
     return samples > 0.0f ? 1.0f / per_worth : anchor->samples;
 }
@@ -17,25 +21,24 @@ INLINE float worth_of(const Pair *p, const Anchor *anchor, const Known *known) {
 // without a new sample stay as they are to the bit.
 __kernel WIDE void fold_change(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PARAMETERS, CELLS_PARAMETERS,
                                SHOWN_IMAGE_PARAMETERS) {
-    const Patch patch = patch_of(width, height);
+    const Patch patch = patch_of(width, height, CELL_SIZE);
     const size_t pixels = (size_t)width * height;
-    const uint in_row = cells_in_row(width), total = cell_count(width, height);
-    EACH_ROW(y, patch) {
-        const uint cell_row = (uint)y / CELL_SIZE * in_row;
-        EACH_LANE(x, patch) {
-            const size_t pixel = y * width + x;
-            const Pair p = load_pair(pairs, pixels, pixel);
-            const Anchor anchor = load_anchor(anchor_sums, pixels, pixel);
-            const uint cell = cell_row + (uint)x / CELL_SIZE;
-            const Known known = load_known(cells, total, cell, class_of(labels[pixel]));
-            const Vec3 light = vec3_at(shown_image + 4u * pixel);
-            const int stays = (sample_count(&p) == 0.0f) & (light.x == anchor.radiance.x) &
-                              (light.y == anchor.radiance.y) & (light.z == anchor.radiance.z);
-            const float worth = worth_of(&p, &anchor, &known);
-            anchor_sums[pixel] = stays ? anchor_sums[pixel] : light.x * worth;
-            anchor_sums[pixels + pixel] = stays ? anchor_sums[pixels + pixel] : light.y * worth;
-            anchor_sums[2u * pixels + pixel] = stays ? anchor_sums[2u * pixels + pixel] : light.z * worth;
-            anchor_sums[3u * pixels + pixel] = stays ? anchor_sums[3u * pixels + pixel] : worth;
-        }
+    const uint total = cell_count(width, height);
+    __global const float *row_of_cells = cells + patch.row * cell_columns(width);
+    EACH_ROW(y, patch)
+    EACH_COLUMN(x, patch) {
+        const size_t pixel = y * width + x;
+        const Pair p = load_pair(pairs, pixels, pixel);
+        const Anchor anchor = load_anchor(anchor_sums, pixels, pixel);
+        const uint class = class_of(labels[pixel]);
+        const Vec3 light = vec3_at(shown_image + 4u * pixel);
+        const int stays = (sample_count(&p) == 0.0f) & (light.x == anchor.radiance.x) &
+                          (light.y == anchor.radiance.y) & (light.z == anchor.radiance.z);
+        const float worth =
+            worth_of(&p, &anchor, row_of_cells + class * CELL_PLANES * total + (uint)x / CELL_SIZE, total);
+        anchor_sums[pixel] = stays ? anchor_sums[pixel] : light.x * worth;
+        anchor_sums[pixels + pixel] = stays ? anchor_sums[pixels + pixel] : light.y * worth;
+        anchor_sums[2u * pixels + pixel] = stays ? anchor_sums[2u * pixels + pixel] : light.z * worth;
+        anchor_sums[3u * pixels + pixel] = stays ? anchor_sums[3u * pixels + pixel] : worth;
     }
 }

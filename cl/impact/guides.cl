@@ -1,19 +1,25 @@
-#include "impact/patch.cl"
+#include "impact/cell.cl"
 
 // Guides: which pixels belong together, so that what is known of one may be used for the other.
 //
 // The label of a pixel is a number for what its centre shows in the old and in the new scene together; its
-// highest bit is the class of the pixel, 1 where an object itself changed. Pixels with different labels do
-// not belong together, nor do those whose normals differ by much.
+// highest bit is the class of the pixel. Pixels with different labels do not belong together, nor do those
+// whose normals differ by much.
+//
+// For each pixel and each scale the weights of its eight neighbours stand in two words, a byte each, row by
+// row from the upper left. They are parts of all of GUIDE_UNIT; what they leave is the pixel's own.
+#define GUIDE_WEIGHT(word, i) ((float)(int)((word) >> 8 * (i) & 255u) * (1.0f / GUIDE_UNIT))
 
-INLINE uint class_of(uint label) { return label >> 31; }
-
-// Weights of neighbours at a distance are kept as a byte each, in a word for every pixel: those to the right,
-// at the lower left, below, and at the lower right. The weight between two pixels is the same for both, so
-// that the other four stand with the neighbours.
-#define GUIDE_RIGHT 0
-#define GUIDE_LOWER_LEFT 8
-#define GUIDE_BELOW 16
-#define GUIDE_LOWER_RIGHT 24
-
-#define GUIDE_WEIGHT(word, shift) ((float)((word) >> (shift) & 255u) * (1.0f / 255.0f))
+INLINE void load_guides(__global const uint *guides, size_t size, size_t place, float *weights) {
+    const uint above = guides[place], below = guides[size + place];
+    weights[0] = GUIDE_WEIGHT(above, 0);
+    weights[1] = GUIDE_WEIGHT(above, 1);
+    weights[2] = GUIDE_WEIGHT(above, 2);
+    weights[3] = GUIDE_WEIGHT(above, 3);
+    weights[5] = GUIDE_WEIGHT(below, 0);
+    weights[6] = GUIDE_WEIGHT(below, 1);
+    weights[7] = GUIDE_WEIGHT(below, 2);
+    weights[8] = GUIDE_WEIGHT(below, 3);
+    weights[4] = 1.0f - (((weights[0] + weights[1]) + (weights[2] + weights[3])) +
+                         ((weights[5] + weights[6]) + (weights[7] + weights[8])));
+}

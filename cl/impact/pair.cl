@@ -1,6 +1,7 @@
 #include "base/scalar.cl"
 
-// What pairs have brought for a pixel, and what follows from it; impact/README.md has the formulas.
+// What pairs have brought for a pixel, and what follows from it; incpt/render/impact/README.md has the
+// formulas.
 
 // The kept picture of the old scene: its radiance, and the number of samples behind it.
 typedef struct {
@@ -20,20 +21,15 @@ typedef struct {
     float new_moment, old_moment, joint_moment, touched;
 } Pair;
 
-// Deviations of samples from the mean of their pixel: degrees of freedom, and sums of squares and products.
+// Deviations of samples: degrees of freedom, pairs, and sums of squares and products.
 typedef struct {
-    float freedom_new, squares_new, freedom_pairs, squares_old, products;
+    float freedom_new, squares_new, pairs, squares_old, products;
 } Spread;
-
-// What is known of the pixels around; see layout.CellPlane.
-typedef struct {
-    float new_variance, old_variance, covariance, freedom_new, freedom_pairs, touched;
-} Known;
 
 INLINE Anchor load_anchor(__global const float *sums, size_t pixels, size_t pixel) {
     Anchor anchor;
     anchor.samples = sums[3u * pixels + pixel];
-    float share = anchor.samples > 0.0f ? 1.0f / anchor.samples : 0.0f;
+    const float share = anchor.samples > 0.0f ? 1.0f / anchor.samples : 0.0f;
     anchor.radiance =
         vec3(sums[pixel] * share, sums[pixels + pixel] * share, sums[2u * pixels + pixel] * share);
     return anchor;
@@ -64,78 +60,29 @@ INLINE Vec3 new_sum(const Pair *p) { return add(p->halves[0].new_sum, p->halves[
 INLINE Vec3 old_sum(const Pair *p) { return add(p->halves[0].old_sum, p->halves[1].old_sum); }
 INLINE float mean_square(Vec3 a) { return dot(a, a) * (1.0f / 3.0f); }
 
-// How the samples of one pixel spread around their means. In the sum of products new values are taken from
-// the mean of all samples, of which some may be no pairs; that makes it larger by what is divided out.
-INLINE Spread spread_of(const Pair *p) {
-    float samples = sample_count(p), pairs = pair_count(p);
-    Vec3 x = new_sum(p), y = old_sum(p);
-    float per_sample = 1.0f / MAX(samples, 1.0f), per_pair = 1.0f / MAX(pairs, 1.0f);
-    int spreads = samples >= 2.0f, pairs_spread = pairs >= 2.0f;
+// How the samples of one pixel spread, with `kept` samples behind the old picture.
+//
+// New values spread around their own mean. Old ones spread around a mean that the kept picture knows already,
+// so that each pair tells of their variance, also the first. What the noise of the kept picture adds to
+// squares and products, in which it is common to all pairs of a pixel, is taken off, as it is on average.
+INLINE Spread spread_of(const Pair *p, float kept) {
+    const float samples = sample_count(p), pairs = pair_count(p);
+    const Vec3 x = new_sum(p), y = old_sum(p);
+    const float per_sample = 1.0f / MAX(samples, 1.0f), per_refined = 1.0f / MAX(kept + pairs, 1.0f);
+    const int spreads = samples >= 2.0f, known = (kept >= 1.0f) & (pairs > 0.0f);
     Spread s;
     s.freedom_new = spreads ? samples - 1.0f : 0.0f;
-    s.freedom_pairs = pairs_spread ? pairs - 1.0f : 0.0f;
     s.squares_new = spreads ? MAX(p->new_moment - mean_square(x) * per_sample, 0.0f) : 0.0f;
-    s.squares_old = pairs_spread ? MAX(p->old_moment - mean_square(y) * per_pair, 0.0f) : 0.0f;
-    float excess = s.freedom_new * per_sample * pairs;
-    float products = p->joint_moment - dot(x, y) * (1.0f / 3.0f) * per_sample;
-    s.products = pairs_spread ? products * s.freedom_pairs / MAX(excess, 1e-20f) : 0.0f;
+    s.pairs = known ? pairs : 0.0f;
+    s.squares_old = known ? MAX(p->old_moment - mean_square(y) * per_refined, 0.0f) : 0.0f;
+    // Some of the samples may be no pairs.
+    const float pair_share = pairs * per_sample;
+    const float products = p->joint_moment - dot(x, y) * (1.0f / 3.0f) * pair_share * per_refined;
+    s.products = known ? (products - s.squares_old * per_refined) / (1.0f - pair_share * per_refined) : 0.0f;
     return s;
 }
-
-INLINE Known load_known(__global const float *cells, uint cell_total, uint cell, uint class) {
-    __global const float *planes = cells + class * CELL_PLANES * cell_total + cell;
-    Known known;
-    known.new_variance = planes[CELL_NEW_VARIANCE * cell_total];
-    known.old_variance = planes[CELL_OLD_VARIANCE * cell_total];
-    known.covariance = planes[CELL_COVARIANCE * cell_total];
-    known.freedom_new = planes[CELL_FREEDOM_NEW * cell_total];
-    known.freedom_pairs = planes[CELL_FREEDOM_PAIRS * cell_total];
-    known.touched = planes[CELL_TOUCHED * cell_total];
-    return known;
-}
-
-// Variances below this are rounding, and tell nothing of a correlation.
-#define LEAST_VARIANCE 1e-8f
-// The weight of old values may be larger than that of new ones, but not by much, since it is estimated.
-#define MOST_OLD_WEIGHT 1.5f
 
 // The old picture, refined by the partners of new samples, as its difference from the anchor.
 INLINE Vec3 refinement_of(const Pair *p, const Anchor *anchor) {
     return scale(1.0f / MAX(anchor->samples + pair_count(p), 1e-20f), old_sum(p));
-}
-
-// The weight with which deviations of old values from the refined old picture are taken off new values. Where
-// nothing is known of their correlation it is that of equal samples.
-INLINE float old_weight(const Pair *p, const Anchor *anchor, const Known *known) {
-    float samples = MAX(sample_count(p), 1.0f), pairs = pair_count(p);
-    float equal = (anchor->samples + pairs) / (anchor->samples + samples);
-    float weight = (known->covariance * pairs / samples + LEAST_VARIANCE * equal) /
-                   (known->old_variance + LEAST_VARIANCE);
-    return known->freedom_pairs < 0.5f ? equal : CLAMP(weight, 0.0f, MOST_OLD_WEIGHT);
-}
-
-// The variance of the changed picture with that weight, without shrinkage, times the number of samples.
-INLINE float sample_variance(const Pair *p, const Anchor *anchor, const Known *known, float weight) {
-    float samples = MAX(sample_count(p), 1.0f), pairs = pair_count(p), kept = anchor->samples;
-    float share = pairs > 0.0f ? weight * kept / (kept + pairs) : 0.0f;
-    float old = weight * share * known->old_variance * samples / MAX(pairs, 1.0f);
-    return MAX(known->new_variance - 2.0f * share * known->covariance + old, 1e-12f);
-}
-
-// The change that one half of the samples shows, as its difference from the refined old picture.
-INLINE Vec3 change_of(const Half *samples_of, Vec3 refinement, float weight) {
-    Vec3 new_mean = scale(1.0f / MAX(samples_of->samples, 1.0f), samples_of->new_sum);
-    Vec3 old_mean = scale(1.0f / MAX(samples_of->pairs, 1.0f), samples_of->old_sum);
-    float used = samples_of->pairs > 0.0f ? weight : 0.0f;
-    Vec3 change = subtract(subtract(new_mean, refinement), scale(used, subtract(old_mean, refinement)));
-    return select(samples_of->samples > 0.0f, change, vec3(0.0f, 0.0f, 0.0f));
-}
-
-// The variance of what a pixel shows, without shrinkage. Where nothing changed that is the refined old
-// picture.
-INLINE float shown_variance(const Pair *p, const Anchor *anchor, const Known *known) {
-    float refined = known->new_variance / MAX(anchor->samples + pair_count(p), 1.0f);
-    float weight = old_weight(p, anchor, known);
-    float changed = sample_variance(p, anchor, known, weight) / MAX(sample_count(p), 1.0f);
-    return known->touched > 0.0f ? changed : refined;
 }

@@ -1,276 +1,292 @@
 #include "impact/guides.cl"
-#include "impact/pair.cl"
+#include "impact/rules.cl"
 
-// The shown picture: the refined old picture, and of its change what stands out of the noise.
+// The shown picture: a base that is known well, and what stands out of the noise of the change from it.
+//
+// The base is the refined old picture. Where an object changed itself it is less of it, down to nothing, the
+// less its samples go together with the old ones: then the change is all of the new picture.
 //
 // The change, which the two halves of the samples show independently of each other, is taken apart into
-// details of several scales by guided smoothing passes (a-trous wavelets; Dammertz et al. 2010, Rousselle et
-// al. 2012 for the two halves). Products of the halves, summed up around a pixel, tell how much signal a
-// detail has, squares of their difference how much noise; signal / (signal + noise) of it is shown.
+// details of several scales by guided smoothing passes (a-trous wavelets; Dammertz et al. 2010). Products of
+// the halves tell how much signal the details around have, squares of their difference how much noise
+// (Rousselle et al. 2012 use two halves so); signal / (signal + noise) of each detail is shown.
 //
-//     split_change     the change in each half, and its weight
-//     smooth_change    the next coarser scale, and what is lost on the way: a detail
-//     rest_of_change   what is left behind the coarsest scale, taken as a detail
-//     pool_evidence    signal and noise, summed up around each pixel; twice
-//     shrink_detail    adds what is shown of a detail
-//     store_picture    the picture without margins
+//     split_change    the change in each half, and its weight
+//     smooth_change   the next coarser scale, and the detail that is lost on the way; after the last scale
+//     also
+//                     what is left, as a detail of its own
+//     judge_details   the share that is shown of the details of each cell, class and scale
+//     show_change     the picture
 //
 // Patches without a change nearby are left out. What the sums hold is never smoothed.
 
-#define VEC3_PLANES(planes, size, place)                                                                     \
-    vec3((planes)[place], (planes)[(size) + (place)], (planes)[2u * (size) + (place)])
+// How much of the noise counts that the halves of a pixel show in it alone, where it is above what is known.
+#define OWN_NOISE 0.05f
+// Of a variance: what is lost in rounding.
+#define ROUNDING 1e-7f
 
-INLINE void store_vec3(__global float *planes, size_t size, size_t place, Vec3 value) {
-    planes[place] = value.x;
-    planes[size + place] = value.y;
-    planes[2u * size + place] = value.z;
+// Shares of details are interpolated between cells like rules.
+INLINE Rule rule_between(__global const float *column_rules, size_t size, const CellRows *rows, size_t x,
+                         const ClassShares *class) {
+    const Rule r = {between_cells(column_rules + RULE_OLD_WEIGHT * CLASSES * size, size, rows, x, class),
+                    between_cells(column_rules + RULE_BASE_SHARE * CLASSES * size, size, rows, x, class),
+                    between_cells(column_rules + RULE_VARIANCE * CLASSES * size, size, rows, x, class),
+                    between_cells(column_rules + RULE_PRIOR * CLASSES * size, size, rows, x, class),
+                    between_cells(column_rules + RULE_COVERED * CLASSES * size, size, rows, x, class)};
+    return r;
 }
 
-// Variance of a sample where few degrees of freedom tell of it: that of light which is nearly always black
-// elsewhere, relative to the old picture. It keeps the first samples of bright pixels from drowning others.
-#define PRIOR_FREEDOM 4.0f
-#define PRIOR_VARIANCE 0.5f
-#define LEAST_PRIOR 1e-6f
-// How much of the noise that the halves of a pixel show in it alone counts, since that is known badly.
-#define OWN_NOISE 0.05f
-
-// What a pixel shows without its change, and its change. Where nothing is smoothed only the former is needed,
-// and that nothing shows any detail.
-INLINE void split_pixel(const Pair *p, const Anchor *anchor, const Known *known, Vec3 refinement,
-                        __global float *halves, size_t size, size_t place) {
-    const float weight = old_weight(p, anchor, known);
-    const int changed = known->touched > 0.0f;
-    const Vec3 none = vec3(0.0f, 0.0f, 0.0f);
-    const Vec3 first = select(changed, change_of(&p->halves[0], refinement, weight), none);
-    const Vec3 second = select(changed, change_of(&p->halves[1], refinement, weight), none);
-
-    const float prior = PRIOR_VARIANCE * (mean_square(anchor->radiance) + LEAST_PRIOR);
-    const float known_variance = sample_variance(p, anchor, known, weight);
-    const float variance =
-        (known->freedom_new * known_variance + PRIOR_FREEDOM * prior) / (known->freedom_new + PRIOR_FREEDOM);
-    const int both = (p->halves[0].samples > 0.0f) & (p->halves[1].samples > 0.0f);
-    const float apart = mean_square(subtract(first, second)) * 0.25f * sample_count(p);
-    const float per_variance = 1.0f / (MAX(variance, both ? OWN_NOISE * apart : 0.0f) + 1e-7f);
-    const float first_weight = p->halves[0].samples * per_variance;
-    const float second_weight = p->halves[1].samples * per_variance;
-    store_vec3(halves + HALF_CHANGE_R_0 * size, size, place, scale(first_weight, first));
-    store_vec3(halves + HALF_CHANGE_R_1 * size, size, place, scale(second_weight, second));
-    halves[HALF_WEIGHT_0 * size + place] = first_weight;
-    halves[HALF_WEIGHT_1 * size + place] = second_weight;
+// The change that a half of the samples shows, from a base that is the refined old picture plus `from_base`.
+INLINE Vec3 change_of(const Half *samples_of, float per_sample, float per_pair, Vec3 refinement, float weight,
+                      Vec3 from_base) {
+    const float used = samples_of->pairs > 0.0f ? weight : 0.0f;
+    const Vec3 new_mean = scale(per_sample, samples_of->new_sum);
+    const Vec3 old_mean = scale(used * per_pair, samples_of->old_sum);
+    // Deviations of old values from the refined old picture are taken off.
+    const Vec3 expected = scale(1.0f - used, refinement);
+    return subtract(subtract(subtract(new_mean, old_mean), expected), from_base);
 }
 
 __kernel WIDE void split_change(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PARAMETERS, CELLS_PARAMETERS,
-                                ACTIVITIES_PARAMETERS, HALVES_PARAMETERS, EVIDENCE_PARAMETERS,
-                                SHOWN_PARAMETERS) {
-    const Patch patch = patch_of(width, height);
-    const size_t pixels = (size_t)width * height, size = field_size(width, height);
-    const uint in_row = cells_in_row(width), total = cell_count(width, height);
+                                SPANS_PARAMETERS, COLUMN_RULES_PARAMETERS, HALVES_PARAMETERS, BASE_PARAMETERS,
+                                SHOWN_IMAGE_PARAMETERS) {
+    const Patch patch = patch_of(width, height, CELL_SIZE);
     if (patch.top >= height)
         return;
-    if (activities[patch.index] == ACTIVITY_IDLE) {
-        EACH_ROW(y, patch)
-        EACH_LANE(x, patch) {
-            const size_t pixel = y * width + x, place = field_place(width, x, y);
-            const Anchor anchor = load_anchor(anchor_sums, pixels, pixel);
+    const size_t pixels = (size_t)width * height, size = field_size(width, height);
+    const Patch near = narrowed(&patch, spans[2u * patch.index], spans[2u * patch.index + 1u]);
+    // On both sides of what changes the refined old picture is all there is to show.
+    for (int side = 0; side < 2; side++) {
+        const Patch idle = narrowed(&patch, side ? near.right : patch.left, side ? patch.right : near.left);
+        EACH_ROW(y, idle)
+        EACH_COLUMN(x, idle) {
+            const size_t pixel = y * width + x;
             const Pair p = load_pair(pairs, pixels, pixel);
-            store_vec3(shown, size, place, add(anchor.radiance, refinement_of(&p, &anchor)));
-            store_vec3(evidence, size, place, vec3(0.0f, 0.0f, 0.0f));
+            const Anchor anchor = load_anchor(anchor_sums, pixels, pixel);
+            const Vec3 light = add(anchor.radiance, refinement_of(&p, &anchor));
+            store_pixel(shown_image, pixel, light, anchor.samples + sample_count(&p) > 0.0f);
         }
-        return;
     }
-    EACH_ROW(y, patch) {
-        const uint cell_row = (uint)y / CELL_SIZE * in_row;
-        EACH_LANE(x, patch) {
+    const size_t rule_size = (size_t)width * cell_rows(height);
+    const uint total = cell_count(width, height);
+    __global const float *touched = cells + CELL_TOUCHED * total + patch.row * cell_columns(width);
+    __global const float *second_touched = touched + CELL_PLANES * total;
+    EACH_ROW(y, near) {
+        const CellRows rows = cell_rows_around(width, height, y);
+        EACH_COLUMN(x, near) {
             const size_t pixel = y * width + x, place = field_place(width, x, y);
             const Pair p = load_pair(pairs, pixels, pixel);
             const Anchor anchor = load_anchor(anchor_sums, pixels, pixel);
-            const uint cell = cell_row + (uint)x / CELL_SIZE;
-            const Known known = load_known(cells, total, cell, class_of(labels[pixel]));
+            const ClassShares class = class_shares(labels[pixel]);
+            const Rule rule = rule_between(column_rules, rule_size, &rows, x, &class);
+            const int cell = (int)x / (int)CELL_SIZE;
+            const int changed = class.first * touched[cell] + class.second * second_touched[cell] > 0.0f;
+
             const Vec3 refinement = refinement_of(&p, &anchor);
-            split_pixel(&p, &anchor, &known, refinement, halves, size, place);
-            store_vec3(shown, size, place, add(anchor.radiance, refinement));
+            const Vec3 refined = add(anchor.radiance, refinement);
+            const Vec3 base = scale(changed ? rule.base_share : 1.0f, refined);
+            const Vec3 from_base = subtract(base, refined);
+            const float weight = weight_of_pairs(&p, &rule);
+            // One division serves four numbers, each at least 1 and at most some million.
+            const float s0 = MAX(p.halves[0].samples, 1.0f), s1 = MAX(p.halves[1].samples, 1.0f);
+            const float p0 = MAX(p.halves[0].pairs, 1.0f), p1 = MAX(p.halves[1].pairs, 1.0f);
+            const float per_all = 1.0f / (s0 * s1 * (p0 * p1));
+            const float per_samples = per_all * (p0 * p1), per_pairs = per_all * (s0 * s1);
+            const Vec3 first =
+                change_of(&p.halves[0], per_samples * s1, per_pairs * p1, refinement, weight, from_base);
+            const Vec3 second =
+                change_of(&p.halves[1], per_samples * s0, per_pairs * p0, refinement, weight, from_base);
+
+            const int has_first = p.halves[0].samples > 0.0f, has_second = p.halves[1].samples > 0.0f;
+            const float apart = mean_square(subtract(first, second)) * 0.25f * sample_count(&p);
+            const float own = has_first & has_second ? OWN_NOISE * apart : 0.0f;
+            const float per_variance =
+                1.0f / (MAX(sample_variance(&p, &anchor, &rule, weight), own) + ROUNDING);
+            const Vec3 none = vec3(0.0f, 0.0f, 0.0f);
+            store_vec3(halves + HALF_CHANGE_R_0 * size, size, place,
+                       select(changed & has_first, first, none));
+            store_vec3(halves + HALF_CHANGE_R_1 * size, size, place,
+                       select(changed & has_second, second, none));
+            halves[HALF_WEIGHT_0 * size + place] = p.halves[0].samples * per_variance;
+            halves[HALF_WEIGHT_1 * size + place] = p.halves[1].samples * per_variance;
+            store_vec3(base_light, pixels, pixel, base);
         }
     }
 }
 
-// The weighted mean of a plane around a place; `weights` are those of the neighbours, row by row.
-INLINE float smoothed(__global const float *plane, size_t place, size_t step, size_t below,
-                      const float *weights) {
-    __global const float *above_row = plane + place - below, *row = plane + place, *below_row = row + below;
-    return weights[0] * above_row[-(ptrdiff_t)step] + weights[1] * above_row[0] +
-           weights[2] * above_row[step] + weights[3] * row[-(ptrdiff_t)step] + weights[4] * row[0] +
-           weights[5] * row[step] + weights[6] * below_row[-(ptrdiff_t)step] + weights[7] * below_row[0] +
-           weights[8] * below_row[step];
+// A plane at a place and around it.
+typedef struct {
+    float at[9];
+} Around;
+
+INLINE Around load_around(__global const float *plane, size_t place, size_t step, size_t below) {
+    __global const float *middle = plane + place, *upper = middle - below, *lower = middle + below;
+    const ptrdiff_t s = (ptrdiff_t)step;
+    const Around around = {
+        {upper[-s], upper[0], upper[s], middle[-s], middle[0], middle[s], lower[-s], lower[0], lower[s]}};
+    return around;
 }
 
-// The weights of a pixel and its neighbours, which sum up to 1: a binomial kernel times the guides.
-INLINE void smoothing_weights(__global const uint *guides, size_t place, size_t step, size_t below,
-                              float *weights) {
-    const uint own = guides[place], left = guides[place - step], upper_left = guides[place - below - step];
-    const uint above = guides[place - below], upper_right = guides[place - below + step];
-    weights[0] = 0.25f * GUIDE_WEIGHT(upper_left, GUIDE_LOWER_RIGHT);
-    weights[1] = 0.5f * GUIDE_WEIGHT(above, GUIDE_BELOW);
-    weights[2] = 0.25f * GUIDE_WEIGHT(upper_right, GUIDE_LOWER_LEFT);
-    weights[3] = 0.5f * GUIDE_WEIGHT(left, GUIDE_RIGHT);
-    weights[4] = 1.0f;
-    weights[5] = 0.5f * GUIDE_WEIGHT(own, GUIDE_RIGHT);
-    weights[6] = 0.25f * GUIDE_WEIGHT(own, GUIDE_LOWER_LEFT);
-    weights[7] = 0.5f * GUIDE_WEIGHT(own, GUIDE_BELOW);
-    weights[8] = 0.25f * GUIDE_WEIGHT(own, GUIDE_LOWER_RIGHT);
-    float sum = 0.0f;
+INLINE float weighted(const Around *around, const float *weights) {
+    return ((weights[0] * around->at[0] + weights[1] * around->at[1] + weights[2] * around->at[2]) +
+            (weights[3] * around->at[3] + weights[4] * around->at[4] + weights[5] * around->at[5])) +
+           (weights[6] * around->at[6] + weights[7] * around->at[7] + weights[8] * around->at[8]);
+}
+
+// The change of one half at the next scale, and its weight there.
+INLINE Vec3 smooth_half(__global const float *changes, __global const float *plane_of_weights, size_t size,
+                        size_t place, size_t step, size_t below, const float *guide_weights, float *weight) {
+    const Around half_weights = load_around(plane_of_weights, place, step, below);
+    float weights[9], sum = 0.0f;
 #pragma unroll
-    for (int i = 0; i < 9; i++)
+    for (int i = 0; i < 9; i++) {
+        weights[i] = guide_weights[i] * half_weights.at[i];
         sum += weights[i];
-    const float per_sum = 1.0f / sum;
-#pragma unroll
-    for (int i = 0; i < 9; i++)
-        weights[i] *= per_sum;
+    }
+    *weight = sum;
+    const Around red = load_around(changes, place, step, below);
+    const Around green = load_around(changes + size, place, step, below);
+    const Around blue = load_around(changes + 2u * size, place, step, below);
+    return scale(1.0f / MAX(sum, 1e-30f),
+                 vec3(weighted(&red, weights), weighted(&green, weights), weighted(&blue, weights)));
 }
 
-// Stores what is told of a detail by the two halves of it and the weights of these: `first` and `second`.
-INLINE void store_detail(Vec3 first, Vec3 second, float first_weight, float second_weight, uint scale_index,
-                         __global float *details, __global float *evidence, size_t size, size_t place) {
-    const int both = (first_weight > 0.0f) & (second_weight > 0.0f);
+// What a detail of a pixel counts for, and its mean over both halves.
+typedef struct {
+    Vec3 mean;
+    float signal, noise;
+} Detail;
+
+INLINE Detail detail_of(Vec3 first, Vec3 second, float first_weight, float second_weight) {
     const float weight = first_weight + second_weight, per_weight = 1.0f / MAX(weight, 1e-30f);
-    const float first_share = first_weight * per_weight, second_share = second_weight * per_weight;
-    const Vec3 mean = add(scale(first_share, first), scale(second_share, second));
-    const float signal = dot(first, second) * (1.0f / 3.0f);
-    const float apart = mean_square(subtract(first, second));
-    const float noise = both ? apart * first_share * second_share : 0.0f;
-    const int counts = both & (mean_square(first) + mean_square(second) > 0.0f);
-    const float evidence_weight = counts ? 1.0f / (noise * OWN_NOISE + per_weight + 1e-12f) : 0.0f;
-    // In the finest detail one half alone tells nothing of its noise, nor do its neighbours.
-    const int shows = scale_index > 0u ? weight > 0.0f : both;
-    store_vec3(details, size, place, select(shows, mean, vec3(0.0f, 0.0f, 0.0f)));
-    details[DETAIL_NOISE * size + place] = noise;
-    evidence[EVIDENCE_SIGNAL * size + place] = signal * evidence_weight;
-    evidence[EVIDENCE_NOISE * size + place] = noise * evidence_weight;
-    evidence[EVIDENCE_WEIGHT * size + place] = evidence_weight;
+    const int both = (first_weight > 0.0f) & (second_weight > 0.0f);
+    // What is known well counts more, but not as much more as its weight says, which is not known well.
+    const float count = both ? SQRT(weight) : 0.0f;
+    Detail detail;
+    detail.mean = add(scale(first_weight * per_weight, first), scale(second_weight * per_weight, second));
+    detail.signal = count * dot(first, second) * (1.0f / 3.0f);
+    detail.noise = count * mean_square(subtract(first, second)) * (first_weight * per_weight) *
+                   (second_weight * per_weight);
+    return detail;
 }
 
-// The change of a half, from the change times its weight.
-INLINE Vec3 unweighted(__global const float *planes, size_t size, size_t place, float weight) {
-    const float per_weight = weight > 0.0f ? 1.0f / weight : 0.0f;
-    return scale(per_weight, VEC3_PLANES(planes, size, place));
-}
+#define ADD_EVIDENCE(detail, class, first_plane)                                                             \
+    COLUMN(columns, first_plane + EVIDENCE_SIGNAL, x, patch) += class.first * detail.signal;                 \
+    COLUMN(columns, first_plane + EVIDENCE_NOISE, x, patch) += class.first * detail.noise;                   \
+    COLUMN(columns, first_plane + EVIDENCE_PLANES + EVIDENCE_SIGNAL, x, patch) +=                            \
+        class.second * detail.signal;                                                                        \
+    COLUMN(columns, first_plane + EVIDENCE_PLANES + EVIDENCE_NOISE, x, patch) += class.second * detail.noise
 
-INLINE Vec3 smooth_vec3(__global const float *planes, size_t size, size_t place, size_t step, size_t below,
-                        const float *weights) {
-    return vec3(smoothed(planes, place, step, below, weights),
-                smoothed(planes + size, place, step, below, weights),
-                smoothed(planes + 2u * size, place, step, below, weights));
-}
-
-__kernel WIDE void smooth_change(PICTURE_PARAMETERS, GUIDES_PARAMETERS, ACTIVITIES_PARAMETERS,
+// `details` has three planes for each scale, and for the rest; `evidence` has Evidence for each class of
+// these.
+__kernel WIDE void smooth_change(PICTURE_PARAMETERS, LABELS_PARAMETERS, GUIDES_PARAMETERS, SPANS_PARAMETERS,
                                  SCALE_PARAMETERS, HALVES_PARAMETERS, SMOOTH_HALVES_PARAMETERS,
-                                 EVIDENCE_PARAMETERS, DETAILS_PARAMETERS) {
-    const Patch patch = patch_of(width, height);
-    if (patch.top >= height || activities[patch.index] == ACTIVITY_IDLE)
+                                 DETAILS_PARAMETERS, EVIDENCE_PARAMETERS) {
+#ifdef LAST_SCALE
+    CELL_COLUMNS(columns, 2u * CLASSES * EVIDENCE_PLANES);
+    const uint sums = 2u * CLASSES * EVIDENCE_PLANES;
+#else
+    CELL_COLUMNS(columns, CLASSES * EVIDENCE_PLANES);
+    const uint sums = CLASSES * EVIDENCE_PLANES;
+#endif
+    const Patch patch = patch_of(width, height, CELL_SIZE);
+    if (patch.top >= height)
         return;
-    const size_t size = field_size(width, height), pitch = field_pitch(width);
-    const size_t step = 1u << scale_index, below = step * pitch;
-    __global const uint *guide = guides + scale_index * size;
-    EACH_ROW(y, patch)
-    EACH_LANE(x, patch) {
-        const size_t place = field_place(width, x, y);
+    const size_t pixels = (size_t)width * height, size = field_size(width, height);
+    const size_t step = 1u << scale_index, below = step * field_pitch(width);
+    __global const uint *guide = guides + 2u * scale_index * size;
+    __global float *detail_of_scale = details + 3u * scale_index * pixels;
+    const Patch near = narrowed(&patch, spans[2u * patch.index], spans[2u * patch.index + 1u]);
+    EACH_ROW(y, near)
+    EACH_COLUMN(x, near) {
+        const size_t pixel = y * width + x, place = field_place(width, x, y);
+        const ClassShares class = class_shares(labels[pixel]);
         float weights[9];
-        smoothing_weights(guide, place, step, below, weights);
-        const Vec3 first = smooth_vec3(halves + HALF_CHANGE_R_0 * size, size, place, step, below, weights);
-        const Vec3 second = smooth_vec3(halves + HALF_CHANGE_R_1 * size, size, place, step, below, weights);
-        const float first_weight = smoothed(halves + HALF_WEIGHT_0 * size, place, step, below, weights);
-        const float second_weight = smoothed(halves + HALF_WEIGHT_1 * size, place, step, below, weights);
+        load_guides(guide, size, place, weights);
+        float first_weight, second_weight;
+        const Vec3 first = smooth_half(halves + HALF_CHANGE_R_0 * size, halves + HALF_WEIGHT_0 * size, size,
+                                       place, step, below, weights, &first_weight);
+        const Vec3 second = smooth_half(halves + HALF_CHANGE_R_1 * size, halves + HALF_WEIGHT_1 * size, size,
+                                        place, step, below, weights, &second_weight);
+        const float fine_first_weight = halves[HALF_WEIGHT_0 * size + place];
+        const float fine_second_weight = halves[HALF_WEIGHT_1 * size + place];
+        const Vec3 none = vec3(0.0f, 0.0f, 0.0f);
+        const Vec3 fine_first = load_vec3(halves + HALF_CHANGE_R_0 * size, size, place);
+        const Vec3 fine_second = load_vec3(halves + HALF_CHANGE_R_1 * size, size, place);
+        const Detail detail =
+            detail_of(select(fine_first_weight > 0.0f, subtract(fine_first, first), none),
+                      select(fine_second_weight > 0.0f, subtract(fine_second, second), none),
+                      fine_first_weight, fine_second_weight);
+        // In the finest detail one half alone tells nothing of its noise.
+        const int shows = (scale_index > 0u) | ((fine_first_weight > 0.0f) & (fine_second_weight > 0.0f));
+        store_vec3(detail_of_scale, pixels, pixel, select(shows, detail.mean, none));
+        ADD_EVIDENCE(detail, class, 0u);
+#ifdef LAST_SCALE
+        const Detail rest = detail_of(first, second, first_weight, second_weight);
+        store_vec3(detail_of_scale + 3u * pixels, pixels, pixel, rest.mean);
+        ADD_EVIDENCE(rest, class, CLASSES * EVIDENCE_PLANES);
+#else
         store_vec3(smooth_halves + HALF_CHANGE_R_0 * size, size, place, first);
         store_vec3(smooth_halves + HALF_CHANGE_R_1 * size, size, place, second);
         smooth_halves[HALF_WEIGHT_0 * size + place] = first_weight;
         smooth_halves[HALF_WEIGHT_1 * size + place] = second_weight;
+#endif
+    }
+    __global float *cells_of_scale =
+        evidence + scale_index * CLASSES * EVIDENCE_PLANES * cell_count(width, height);
+    store_cell_sums(columns, sums, &patch, width, height, cells_of_scale);
+}
 
-        const float fine_first = halves[HALF_WEIGHT_0 * size + place];
-        const float fine_second = halves[HALF_WEIGHT_1 * size + place];
-        const Vec3 none = vec3(0.0f, 0.0f, 0.0f);
-        const Vec3 first_detail =
-            subtract(unweighted(halves + HALF_CHANGE_R_0 * size, size, place, fine_first),
-                     scale(first_weight > 0.0f ? 1.0f / first_weight : 0.0f, first));
-        const Vec3 second_detail =
-            subtract(unweighted(halves + HALF_CHANGE_R_1 * size, size, place, fine_second),
-                     scale(second_weight > 0.0f ? 1.0f / second_weight : 0.0f, second));
-        store_detail(select(fine_first > 0.0f, first_detail, none),
-                     select(fine_second > 0.0f, second_detail, none), fine_first, fine_second, scale_index,
-                     details, evidence, size, place);
+// Goes over each class of each row of cells, for each scale and for the rest. Evidence is summed up over
+// neighbouring cells, those at the sides half and those at the corners a quarter.
+__kernel WIDE void judge_details(PICTURE_PARAMETERS, EVIDENCE_PARAMETERS, SHARES_PARAMETERS) {
+    const int columns = cell_columns(width), rows = MAX(cell_rows(height), 1u), total = columns * rows;
+    const Patch patch = patch_of(columns, (SMOOTHING_SCALES + 1u) * CLASSES * cell_rows(height), 1u);
+    EACH_ROW(y, patch) {
+        const int plane = (int)y / rows, row = (int)y % rows;
+        __global const float *middle = evidence + plane * EVIDENCE_PLANES * total + row * columns;
+        const float has_upper = row > 0 ? 0.5f : 0.0f, has_lower = row < rows - 1 ? 0.5f : 0.0f;
+        __global const float *upper = middle - (row > 0 ? columns : 0);
+        __global const float *lower = middle + (row < rows - 1 ? columns : 0);
+        EACH_COLUMN(x, patch) {
+            float sums[EVIDENCE_PLANES];
+#pragma unroll
+            for (size_t i = 0u; i < EVIDENCE_PLANES; i++) {
+                const size_t at = i * total + x;
+#define THREE_ROWS(at) (middle[at] + (has_upper * upper[at] + has_lower * lower[at]))
+                const float left = x > 0u ? THREE_ROWS(at - 1u) : 0.0f;
+                const float right = x + 1u < (size_t)columns ? THREE_ROWS(at + 1u) : 0.0f;
+                sums[i] = THREE_ROWS(at) + 0.5f * (left + right);
+#undef THREE_ROWS
+            }
+            const float signal = MAX(sums[EVIDENCE_SIGNAL], 0.0f);
+            shares[y * columns + x] = signal > 0.0f ? signal / (signal + sums[EVIDENCE_NOISE]) : 0.0f;
+        }
     }
 }
 
-__kernel WIDE void rest_of_change(PICTURE_PARAMETERS, ACTIVITIES_PARAMETERS, HALVES_PARAMETERS,
-                                  EVIDENCE_PARAMETERS, DETAILS_PARAMETERS) {
-    const Patch patch = patch_of(width, height);
-    if (patch.top >= height || activities[patch.index] == ACTIVITY_IDLE)
-        return;
-    const size_t size = field_size(width, height);
-    EACH_ROW(y, patch)
-    EACH_LANE(x, patch) {
-        const size_t place = field_place(width, x, y);
-        const float first_weight = halves[HALF_WEIGHT_0 * size + place];
-        const float second_weight = halves[HALF_WEIGHT_1 * size + place];
-        store_detail(unweighted(halves + HALF_CHANGE_R_0 * size, size, place, first_weight),
-                     unweighted(halves + HALF_CHANGE_R_1 * size, size, place, second_weight), first_weight,
-                     second_weight, SMOOTHING_SCALES, details, evidence, size, place);
-    }
-}
-
-// Looks as far as the details reach: `pool_scale` is that of the detail.
-__kernel WIDE void pool_evidence(PICTURE_PARAMETERS, GUIDES_PARAMETERS, ACTIVITIES_PARAMETERS,
-                                 SCALE_PARAMETERS, EVIDENCE_PARAMETERS, POOLED_PARAMETERS) {
-    const Patch patch = patch_of(width, height);
-    if (patch.top >= height || activities[patch.index] == ACTIVITY_IDLE)
-        return;
-    const size_t size = field_size(width, height), step = 1u << scale_index,
-                 below = step * field_pitch(width);
-    __global const uint *guide = guides + scale_index * size;
-    EACH_ROW(y, patch)
-    EACH_LANE(x, patch) {
-        const size_t place = field_place(width, x, y);
-        float weights[9];
-        smoothing_weights(guide, place, step, below, weights);
-        store_vec3(pooled, size, place, smooth_vec3(evidence, size, place, step, below, weights));
-    }
-}
-
-__kernel WIDE void shrink_detail(PICTURE_PARAMETERS, GUIDES_PARAMETERS, ACTIVITIES_PARAMETERS,
-                                 SCALE_PARAMETERS, POOLED_PARAMETERS, DETAILS_PARAMETERS, SHOWN_PARAMETERS) {
-    const Patch patch = patch_of(width, height);
-    if (patch.top >= height || activities[patch.index] != ACTIVITY_CHANGED)
-        return;
-    const size_t size = field_size(width, height), step = 1u << scale_index,
-                 below = step * field_pitch(width);
-    __global const uint *guide = guides + scale_index * size;
-    EACH_ROW(y, patch)
-    EACH_LANE(x, patch) {
-        const size_t place = field_place(width, x, y);
-        float weights[9];
-        smoothing_weights(guide, place, step, below, weights);
-        const Vec3 around = smooth_vec3(pooled, size, place, step, below, weights);
-        const float signal = MAX(around.x, 0.0f);
-        const float own = OWN_NOISE * details[DETAIL_NOISE * size + place] * around.z;
-        const float all = signal + MAX(around.y, own);
-        const float share = all > 0.0f ? signal / MAX(all, 1e-30f) : 0.0f;
-        const Vec3 detail = VEC3_PLANES(details, size, place);
-        store_vec3(shown, size, place, add(VEC3_PLANES(shown, size, place), scale(share, detail)));
-    }
-}
-
-__kernel WIDE void store_picture(PICTURE_PARAMETERS, PAIRS_PARAMETERS, SHOWN_PARAMETERS,
-                                 SHOWN_IMAGE_PARAMETERS) {
-    const Patch patch = patch_of(width, height);
+__kernel WIDE void show_change(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PARAMETERS, SPANS_PARAMETERS,
+                               BASE_PARAMETERS, DETAILS_PARAMETERS, COLUMN_SHARES_PARAMETERS,
+                               SHOWN_IMAGE_PARAMETERS) {
+    const Patch patch = patch_of(width, height, CELL_SIZE);
     if (patch.top >= height)
         return;
-    const size_t pixels = (size_t)width * height, size = field_size(width, height);
-    EACH_ROW(y, patch)
-    EACH_LANE(x, patch) {
-        const size_t pixel = y * width + x, place = field_place(width, x, y);
-        const float samples = anchor_sums[3u * pixels + pixel] + pairs[PAIR_SAMPLES_0 * pixels + pixel] +
-                              pairs[PAIR_SAMPLES_1 * pixels + pixel];
-        shown_image[4u * pixel] = shown[place];
-        shown_image[4u * pixel + 1u] = shown[size + place];
-        shown_image[4u * pixel + 2u] = shown[2u * size + place];
-        shown_image[4u * pixel + 3u] = samples > 0.0f ? 1.0f : 0.0f;
+    const Patch near = narrowed(&patch, spans[2u * patch.index], spans[2u * patch.index + 1u]);
+    const size_t pixels = (size_t)width * height, size = (size_t)width * cell_rows(height);
+    EACH_ROW(y, near) {
+        const CellRows rows = cell_rows_around(width, height, y);
+        EACH_COLUMN(x, near) {
+            const size_t pixel = y * width + x;
+            const ClassShares class = class_shares(labels[pixel]);
+            Vec3 light = load_vec3(base_light, pixels, pixel);
+#pragma unroll
+            for (size_t i = 0u; i <= SMOOTHING_SCALES; i++) {
+                const float share = between_cells(column_shares + i * CLASSES * size, size, &rows, x, &class);
+                light = add(light, scale(share, load_vec3(details + 3u * i * pixels, pixels, pixel)));
+            }
+            const float samples = anchor_sums[3u * pixels + pixel] + pairs[PAIR_SAMPLES_0 * pixels + pixel] +
+                                  pairs[PAIR_SAMPLES_1 * pixels + pixel];
+            store_pixel(shown_image, pixel, light, samples > 0.0f);
+        }
     }
 }

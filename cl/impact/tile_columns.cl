@@ -1,53 +1,53 @@
-#include "impact/columns.cl"
-#include "impact/guides.cl"
-#include "impact/pair.cl"
+#include "impact/cell.cl"
+#include "impact/rules.cl"
 
 // The squared slope of the display curve at a radiance, from a table with SLOPES_PER_OCTAVE entries for each
 // power of two: the exponent and the first bits behind it are the place in the table.
 INLINE float squared_slope(__global const float *slopes, float radiance) {
-    int place = (int)(as_uint(MAX(radiance, 0.0f)) / ((1u << 23) / SLOPES_PER_OCTAVE)) -
-                (int)(SLOPE_FIRST_OCTAVE * SLOPES_PER_OCTAVE);
+    const int place = (int)(as_uint(MAX(radiance, 0.0f)) / ((1u << 23) / SLOPES_PER_OCTAVE)) -
+                      (int)(SLOPE_FIRST_OCTAVE * SLOPES_PER_OCTAVE);
     return slopes[CLAMP(place, 0, (int)(SLOPE_OCTAVES * SLOPES_PER_OCTAVE) - 1)];
 }
 
-// Sums over the columns of a tile, which sum_columns then adds up: layout.TileSum.
+// Sums over the columns of tiles `row_count` pixels high, which sum_columns then adds up: layout.TileSum.
 __kernel WIDE void tile_columns(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PARAMETERS, CELLS_PARAMETERS,
-                                SLOPES_PARAMETERS, COLUMNS_PARAMETERS) {
-    const Patch strip = strip_of(width, height, row_count);
-    const size_t pixels = (size_t)width * height, plane = column_plane(width, height, row_count);
-    const uint in_row = cells_in_row(width), total = cell_count(width, height);
-    for (size_t y = strip.top; y < strip.bottom; y++) {
+                                RULES_PARAMETERS, SLOPES_PARAMETERS, TILE_COLUMNS_PARAMETERS) {
+    const Patch strip = patch_of(width, height, row_count);
+    const size_t pixels = (size_t)width * height,
+                 plane = (size_t)width * ((height + row_count - 1u) / row_count);
+    const uint in_row = cell_columns(width), total = cell_count(width, height);
+    EACH_ROW(y, strip) {
         const int begins = y == strip.top;
         const uint cell_row = (uint)y / CELL_SIZE * in_row;
         EACH_COLUMN(x, strip) {
             const size_t pixel = y * width + x;
             const Pair p = load_pair(pairs, pixels, pixel);
             const Anchor anchor = load_anchor(anchor_sums, pixels, pixel);
-            const uint cell = cell_row + (uint)x / CELL_SIZE;
-            const Known known = load_known(cells, total, cell, class_of(labels[pixel]));
-            const Spread spread = spread_of(&p);
+            const Spread spread = spread_of(&p, anchor.samples);
+            const uint cell = cell_row + (uint)x / CELL_SIZE, class = class_of(labels[pixel]);
+            const float variance = shown_variance(&p, &anchor, cells, rules, total, cell, class);
             const float samples = sample_count(&p), pair_total = pair_count(&p);
             const Vec3 light = anchor.radiance;
             const float weight = squared_slope(slopes, (light.x + light.y + light.z) * (1.0f / 3.0f));
             // Of samples without a partner the squares are taken off as they are on average.
             const float among_pairs = p.new_moment * pair_total / MAX(samples, 1.0f);
-            const float differences = MAX(among_pairs + p.old_moment - 2.0f * p.joint_moment, 0.0f);
             float values[TILE_SUM_PLANES];
             values[TILE_SUM_SAMPLES] = samples;
             values[TILE_SUM_PAIRS] = pair_total;
             values[TILE_SUM_TOUCHED] = p.touched;
             values[TILE_SUM_KEPT] = anchor.samples;
             values[TILE_SUM_FREEDOM_NEW] = spread.freedom_new;
-            values[TILE_SUM_FREEDOM_PAIRS] = spread.freedom_pairs;
+            values[TILE_SUM_FREEDOM_PAIRS] = spread.pairs;
             values[TILE_SUM_SQUARES_NEW] = weight * spread.squares_new;
             values[TILE_SUM_SQUARES_OLD] = weight * spread.squares_old;
             values[TILE_SUM_PRODUCTS] = weight * spread.products;
-            values[TILE_SUM_DIFFERENCES] = weight * differences;
-            values[TILE_SUM_ERROR] = weight * shown_variance(&p, &anchor, &known);
-            __global float *column = columns + strip.index * width + x;
+            values[TILE_SUM_DIFFERENCES] =
+                weight * MAX(among_pairs + p.old_moment - 2.0f * p.joint_moment, 0.0f);
+            values[TILE_SUM_ERROR] = weight * variance;
+            __global float *column = columns + strip.row * width + x;
 #pragma unroll
             for (uint i = 0u; i < TILE_SUM_PLANES; i++)
-                add_to_column(&column[i * plane], begins, values[i]);
+                column[i * plane] = values[i] + (begins ? 0.0f : column[i * plane]);
         }
     }
 }

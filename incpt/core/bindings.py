@@ -273,11 +273,11 @@ NORMALS = Group(
 GUIDES = Group(
     "GUIDES",
     None,
-    (Argument("guides", "__global uint *", "SMOOTHING_STEPS planes of weights of neighbours"),),
+    (Argument("guides", "__global uint *", "of each scale two planes, see impact/guides.cl"),),
 )
 
-COLUMNS = Group(
-    "COLUMNS",
+TILE_COLUMNS = Group(
+    "TILE_COLUMNS",
     None,
     (
         _count("row_count", "pixels of a column"),
@@ -297,16 +297,33 @@ COLUMN_SUMS = Group(
     ),
 )
 
-CELLS = Group(
-    "CELLS",
+CELL_SUMS = Group("CELL_SUMS", None, (_planes("cell_sums", "CellSum for each class"),))
+
+CELLS = Group("CELLS", None, (_planes("cells", "CellPlane for each class"),))
+
+RULES = Group("RULES", None, (_planes("rules", "RulePlane, of each for each class"),))
+
+COLUMN_RULES = Group("COLUMN_RULES", None, (_table("column_rules", "float", "`rules`, interpolated"),))
+
+SPREADING = Group(
+    "SPREADING",
     None,
     (
-        _table("cell_sums", "float", "CellSum for each of two classes"),
-        _planes("cells", "CellPlane for each of two classes"),
+        _count("plane_total", "planes that are interpolated"),
+        _table("cell_values", "float", "with a float for each cell"),
+        _planes("column_values", "with a float for each column of pixels of each row of cells"),
     ),
 )
 
-ACTIVITIES = Group("ACTIVITIES", None, (Argument("activities", "__global uint *", "Activity of each patch"),))
+SPANS = Group(
+    "SPANS",
+    None,
+    (
+        Argument(
+            "spans", "__global uint *", "the columns of each patch near which anything changes: from, to"
+        ),
+    ),
+)
 
 SLOPES = Group("SLOPES", None, (_table("slopes", "float", "squared slope of the display curve"),))
 
@@ -316,13 +333,15 @@ HALVES = Group("HALVES", None, (_planes("halves", "HalfPlane"),))
 
 SMOOTH_HALVES = Group("SMOOTH_HALVES", None, (_planes("smooth_halves", "HalfPlane of the next scale"),))
 
-DETAILS = Group("DETAILS", None, (_planes("details", "DetailPlane"),))
+DETAILS = Group("DETAILS", None, (_planes("details", "three planes for each scale and for the rest"),))
 
-EVIDENCE = Group("EVIDENCE", None, (_planes("evidence", "EvidencePlane of each pixel"),))
+EVIDENCE = Group("EVIDENCE", None, (_planes("evidence", "Evidence for each class of each detail"),))
 
-POOLED = Group("POOLED", None, (_planes("pooled", "EvidencePlane of the pixels around"),))
+SHARES = Group("SHARES", None, (_planes("shares", "what is shown of the details, for each class"),))
 
-SHOWN = Group("SHOWN", None, (_planes("shown", "three planes with a margin: the shown radiance"),))
+COLUMN_SHARES = Group("COLUMN_SHARES", None, (_table("column_shares", "float", "`shares`, interpolated"),))
+
+BASE = Group("BASE", None, (_planes("base_light", "three planes: the picture without its change"),))
 
 SHOWN_IMAGE = Group(
     "SHOWN_IMAGE",
@@ -430,8 +449,9 @@ REFITTING = Group(
 GROUPS = (
     LAUNCH, SLOTS, PLACES, LIST, GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE, PATH_STATE, COMPACTION,
     BLOCK_MEMORY, RADIANCE, CHANGES, PARTNERS, FIRST_HITS, TRACED, REDUCTION, RESOLUTION, PICTURE, PAIRS,
-    OLD_VALUES, LABELS, NORMALS, GUIDES, COLUMNS, COLUMN_SUMS, CELLS, ACTIVITIES, SLOPES, SCALE, HALVES,
-    SMOOTH_HALVES, DETAILS, EVIDENCE, POOLED, SHOWN, SHOWN_IMAGE,
+    OLD_VALUES, LABELS, NORMALS, GUIDES, TILE_COLUMNS, COLUMN_SUMS, CELL_SUMS, CELLS, RULES, COLUMN_RULES,
+    SPREADING, SPANS, SLOPES, SCALE, HALVES, SMOOTH_HALVES, DETAILS, EVIDENCE, SHARES, COLUMN_SHARES, BASE,
+    SHOWN_IMAGE,
     ITEMS, MESH, BOXES, CHUNKS, MEASURES, BINS, SIDES, MOVED, LEVEL, SPLITTING, LINKING, LEAVES, REFITTING,
 )  # fmt: skip
 """Every group."""
@@ -460,17 +480,16 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     "resolve": (RESOLUTION,),
     "reduce_pairs": (LAUNCH, SLOTS, TRACED, PAIRS, OLD_VALUES),
     "weigh_guides": (PICTURE, LABELS, NORMALS, GUIDES),
-    "cell_columns": (PICTURE, PAIRS, LABELS, COLUMNS),
-    "tile_columns": (PICTURE, PAIRS, LABELS, CELLS, SLOPES, COLUMNS),
+    "measure_cells": (PICTURE, PAIRS, LABELS, CELL_SUMS),
+    "pool_cells": (PICTURE, CELL_SUMS, CELLS, RULES),
+    "spread_cells": (PICTURE, SPREADING),
+    "find_spans": (PICTURE, CELLS, SPANS),
+    "tile_columns": (PICTURE, PAIRS, LABELS, CELLS, RULES, SLOPES, TILE_COLUMNS),
     "sum_columns": (COLUMN_SUMS,),
-    "pool_cells": (PICTURE, CELLS),
-    "mark_patches": (PICTURE, CELLS, ACTIVITIES),
-    "split_change": (PICTURE, PAIRS, LABELS, CELLS, ACTIVITIES, HALVES, EVIDENCE, SHOWN),
-    "smooth_change": (PICTURE, GUIDES, ACTIVITIES, SCALE, HALVES, SMOOTH_HALVES, EVIDENCE, DETAILS),
-    "rest_of_change": (PICTURE, ACTIVITIES, HALVES, EVIDENCE, DETAILS),
-    "pool_evidence": (PICTURE, GUIDES, ACTIVITIES, SCALE, EVIDENCE, POOLED),
-    "shrink_detail": (PICTURE, GUIDES, ACTIVITIES, SCALE, POOLED, DETAILS, SHOWN),
-    "store_picture": (PICTURE, PAIRS, SHOWN, SHOWN_IMAGE),
+    "split_change": (PICTURE, PAIRS, LABELS, CELLS, SPANS, COLUMN_RULES, HALVES, BASE, SHOWN_IMAGE),
+    "smooth_change": (PICTURE, LABELS, GUIDES, SPANS, SCALE, HALVES, SMOOTH_HALVES, DETAILS, EVIDENCE),
+    "judge_details": (PICTURE, EVIDENCE, SHARES),
+    "show_change": (PICTURE, PAIRS, LABELS, SPANS, BASE, DETAILS, COLUMN_SHARES, SHOWN_IMAGE),
     "fold_change": (PICTURE, PAIRS, LABELS, CELLS, SHOWN_IMAGE),
     "bound_faces": (ITEMS, MESH, BOXES),
     "measure_chunks": (ITEMS, BOXES, CHUNKS, MEASURES),

@@ -220,17 +220,20 @@ class SamplePlane(IntEnum):
     NORMAL_Z = 8
 
 
-PATCH_WIDTH = 32
-"""Width of a patch, the pixels that the kernels of cl/impact/ work on at a time: two registers of floats."""
-PATCH_HEIGHT = 8
+PATCH_WIDTH = 256
+"""Width of a patch, the pixels that the kernels of cl/impact/ work on at a time: rows long enough that memory
+comes ahead of them, short enough that a patch stays in the nearest cache."""
 CELL_SIZE = 8
-"""Edge of a cell: statistics of pairs are pooled over the pixels of one, each class of pixels for itself."""
+"""Height of a patch and edge of a cell: statistics of pairs are pooled over the pixels of one, each class of
+pixels for itself."""
+CLASSES = 2
+"""Of pixels: those that show an object which changed itself, and all others, which come first."""
 SMOOTHING_SCALES = 4
 """Passes that take a change apart; that of scale k looks 2^k pixels around."""
-SMOOTHING_STEPS = 5
-"""Different distances that smoothing passes look around, from 1 pixel on, each twice the one before."""
-FIELD_MARGIN = 16
-"""Pixels around the picture in the planes that are smoothed: the longest distance."""
+FIELD_MARGIN = 8
+"""Pixels around the picture in the planes that are smoothed: the longest distance that passes look around."""
+GUIDE_UNIT = 765
+"""Weights of neighbours are whole numbers of this part of all; the largest there are is a third."""
 SLOPES_PER_OCTAVE = 8
 """Of the table of slopes of the display curve: a power of two, so that bits of a float are a place in it."""
 SLOPE_OCTAVES = 20
@@ -275,28 +278,44 @@ class PairPlane(IntEnum):
 
 
 class CellSum(IntEnum):
-    """Sums over the pixels of a cell that have one class. Squares and products are of deviations from the
-    mean of a pixel; see `TileSums`, which has them too."""
+    """Sums over the pixels of a cell that have one class: NEW_MOMENT of PairPlane, and what `TileSums` has
+    too, here without weights."""
 
-    FREEDOM_NEW = 0
-    SQUARES_NEW = 1
-    FREEDOM_PAIRS = 2
-    SQUARES_OLD = 3
-    PRODUCTS = 4
-    TOUCHED = 5
+    SAMPLES = 0
+    PAIRS = 1
+    FREEDOM_NEW = 2
+    SQUARES_NEW = 3
+    NEW_MOMENT = 4
+    SQUARES_OLD = 5
+    PRODUCTS = 6
+    TOUCHED = 7
 
 
 class CellPlane(IntEnum):
-    """What is known of the pixels of a cell that have one class: the variance of a sample in the new and in
-    the old scene and the covariance of both, means over the channels; degrees of freedom of the first and of
-    the others; how many samples met something that changed."""
+    """What the pixels of a cell that have one class, and of cells around it, say of samples: the variance in
+    the new and in the old scene and the covariance of both, means over the channels; the mean square of the
+    difference from the kept picture; degrees of freedom of the first, and pairs behind the others; how many
+    samples met something that changed."""
 
     NEW_VARIANCE = 0
     OLD_VARIANCE = 1
     COVARIANCE = 2
-    FREEDOM_NEW = 3
-    FREEDOM_PAIRS = 4
-    TOUCHED = 5
+    NEW_MOMENT = 3
+    FREEDOM_NEW = 4
+    PAIRS = 5
+    TOUCHED = 6
+
+
+class RulePlane(IntEnum):
+    """What follows from CellPlane for a pixel; see cl/impact/cell_statistics.cl. With them, the variance of a
+    sample of the change is VARIANCE + PRIOR * (square of the kept picture) - COVERED * (share of the kept
+    samples in the refined old picture)."""
+
+    OLD_WEIGHT = 0
+    BASE_SHARE = 1
+    VARIANCE = 2
+    PRIOR = 3
+    COVERED = 4
 
 
 class TileSum(IntEnum):
@@ -316,8 +335,8 @@ class TileSum(IntEnum):
 
 
 class HalfPlane(IntEnum):
-    """Planes of the change of the picture as the two halves of the samples show it, times the weight that it
-    has, and of these weights. They have a margin, see FIELD_MARGIN."""
+    """Planes of the change of the picture as each half of the samples shows it, and of the weights that the
+    halves have. They have a margin, see FIELD_MARGIN."""
 
     CHANGE_R_0 = 0
     CHANGE_G_0 = 1
@@ -329,32 +348,12 @@ class HalfPlane(IntEnum):
     WEIGHT_1 = 7
 
 
-class DetailPlane(IntEnum):
-    """Planes of what one scale of the change is made of: the mean of both halves, and the noise of that mean
-    as the two show it in the pixel alone. With a margin, as HalfPlane."""
-
-    MEAN_R = 0
-    MEAN_G = 1
-    MEAN_B = 2
-    NOISE = 3
-
-
-class EvidencePlane(IntEnum):
-    """Planes of what is summed up around a pixel to tell signal from noise in a detail: products of the two
-    halves and squares of their difference, both times a weight, and the weight. With a margin."""
+class Evidence(IntEnum):
+    """What is summed up over a cell and class to tell how much of a detail is no noise: products of the two
+    halves, which noise is not part of on average, and the noise of their mean."""
 
     SIGNAL = 0
     NOISE = 1
-    WEIGHT = 2
-
-
-class Activity(IntEnum):
-    """Of a patch: nothing changes near it; something that is smoothed reaches into it or into its neighbours;
-    the picture may change there."""
-
-    IDLE = 0
-    NEAR = 1
-    CHANGED = 2
 
 
 class PathClass(IntFlag):
@@ -674,11 +673,10 @@ def c_header() -> str:
         (PairPlane, "PAIR"),
         (CellSum, "CELL_SUM"),
         (CellPlane, "CELL"),
+        (RulePlane, "RULE"),
         (TileSum, "TILE_SUM"),
         (HalfPlane, "HALF"),
-        (DetailPlane, "DETAIL"),
-        (EvidencePlane, "EVIDENCE"),
-        (Activity, "ACTIVITY"),
+        (Evidence, "EVIDENCE"),
         (PathClass, "CLASS"),
         (SlotFlag, "SLOT"),
         (MaterialFlag, "MATERIAL"),

@@ -44,6 +44,7 @@ FEATURES = {
     "MIS_ONLY_BSDF": "BSDF sampling alone brings light, for the tests of its weights.",
     "CHANNELS": "With a number: how many floats a pass of the film has for each pixel.",
     "SQUARES": "A pass of the film sums up squares.",
+    "LAST_SCALE": "What smoothing a change leaves behind is taken as a detail too.",
     "KEEP_SUMS": "The picture of a pass of the film is not divided by the number of samples.",
 }
 """Every preprocessor name that chooses a variant of a program, and what it says."""

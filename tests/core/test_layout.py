@@ -68,8 +68,8 @@ def test_constants_and_planes_are_in_the_header() -> None:
         layout.CellPlane,
         layout.TileSum,
         layout.HalfPlane,
-        layout.DetailPlane,
-        layout.EvidencePlane,
+        layout.RulePlane,
+        layout.Evidence,
     ],
 )
 def test_planes_are_numbered_without_gaps(enum: type[IntEnum]) -> None:

@@ -21,7 +21,7 @@ class Guides:
 
     def __init__(self, device: Device, width: int, height: int) -> None:
         self.patches = Patches(device, width, height)
-        pixels, weights = width * height, layout.SMOOTHING_STEPS * self.patches.field_size
+        pixels, weights = width * height, 2 * layout.SMOOTHING_SCALES * self.patches.field_size
         self.labels, self._normals = device.empty(4 * pixels), device.empty(12 * pixels)
         self.weights = device.empty(4 * weights)
         # Beyond the edges of the picture nothing counts.
@@ -53,4 +53,4 @@ class Guides:
 
     def _weigh(self, patches: Patches, least: int = 1) -> None:
         values = {"labels": self.labels, "guide_normals": self._normals, "guides": self.weights}
-        patches.launch("weigh_guides", "weigh_guides", values, least)
+        patches.launch("weigh_guides", "weigh_guides", values, least=least)

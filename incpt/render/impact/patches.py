@@ -1,4 +1,4 @@
-"""Patches: the pieces of a picture that the kernels of cl/impact/ work on."""
+"""Patches: the pieces of a picture that the kernels of cl/impact/ work on, and launches over them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Any
 from incpt.core import bindings, layout
 from incpt.device.device import Device
 
-_PATCH_PIXELS = layout.PATCH_WIDTH * layout.PATCH_HEIGHT
+_ALIGNMENT = 16
+"""Rows of planes with a margin begin so many floats apart, or a multiple: see cl/impact/patch.cl."""
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,7 @@ class Patches:
     """A picture of `width` x `height` pixels on a device, cut into patches.
 
     CPUs under clang get a work-item for each patch, in whose loops the compiler finds SIMD lanes; other
-    devices one for each pixel, and a group of them for each patch. See cl/impact/patch.cl.
+    devices a group of them, one for each column.
     """
 
     device: Device
@@ -25,50 +26,92 @@ class Patches:
     height: int
 
     @property
-    def columns(self) -> int:
-        """Patches side by side."""
-        return -(-self.width // layout.PATCH_WIDTH)
+    def count(self) -> int:
+        """Patches of the height of a cell."""
+        return self._across(self.width) * self.cell_rows
 
     @property
-    def count(self) -> int:
-        """All patches."""
-        return self.columns * -(-self.height // layout.PATCH_HEIGHT)
+    def cell_columns(self) -> int:
+        """Cells side by side."""
+        return -(-self.width // layout.CELL_SIZE)
+
+    @property
+    def cell_rows(self) -> int:
+        """Rows of cells."""
+        return -(-self.height // layout.CELL_SIZE)
 
     @property
     def cells(self) -> int:
         """All cells."""
-        return -(-self.width // layout.CELL_SIZE) * -(-self.height // layout.CELL_SIZE)
+        return self.cell_columns * self.cell_rows
 
     @property
     def field_size(self) -> int:
         """Floats of a plane with a margin."""
         margin = 2 * layout.FIELD_MARGIN
-        return (self.columns * layout.PATCH_WIDTH + margin) * (self.height + margin)
+        row = -(-self.width // _ALIGNMENT) * _ALIGNMENT + margin
+        return row * (self.height + margin)
 
     @property
     def nothing(self) -> Patches:
         """A picture without pixels, for launches that only build a kernel."""
         return Patches(self.device, 1, 0)
 
-    def launch(self, name: str, file: str, values: Mapping[str, Any], least: int = 1) -> None:
-        """Launch a kernel of cl/`file`.cl over all patches, `least` of them at least."""
-        group = 1 if self.device.is_clang_cpu else _PATCH_PIXELS
-        self._launch(name, file, values, max(self.count, least) * group, group)
-
-    def launch_columns(
-        self, name: str, file: str, values: Mapping[str, Any], rows: int, least: int = 1
+    def launch(
+        self,
+        name: str,
+        file: str,
+        values: Mapping[str, Any],
+        rows: int = layout.CELL_SIZE,
+        features: tuple[str, ...] = (),
+        least: int = 1,
     ) -> None:
-        """Launch a kernel over all columns of `rows` pixels, which a work-item sums up."""
-        group = 1 if self.device.is_clang_cpu else layout.PATCH_WIDTH
-        strips = self.columns * -(-self.height // rows)
-        own = {"row_count": rows}
-        self._launch(name, file, {**own, **values}, max(strips, least) * group, group)
+        """Launch a kernel of cl/`file`.cl over all patches, of `rows` rows of pixels each; `least` of them at
+        least."""
+        self._launch_patches(
+            name, file, values, self._across(self.width) * -(-self.height // rows), features, least
+        )
+
+    def launch_rows(self, name: str, file: str, values: Mapping[str, Any], rows: int, least: int = 1) -> None:
+        """Launch a kernel over patches one row high, of so many rows as long as those of the picture."""
+        self._launch_patches(name, file, values, self._across(self.width) * rows, (), least)
+
+    def launch_cells(
+        self, name: str, file: str, values: Mapping[str, Any], planes: int, least: int = 1
+    ) -> None:
+        """Launch a kernel over patches of the cells of so many planes, one row high."""
+        patches = self._across(self.cell_columns) * planes * self.cell_rows
+        self._launch_patches(name, file, values, patches, (), least)
 
     def launch_items(self, name: str, file: str, values: Mapping[str, Any], items: int) -> None:
         """Launch a kernel over so many work-items."""
-        self._launch(name, file, values, items, None)
+        self._launch(name, file, values, items, None, ())
 
-    def _launch(self, name: str, file: str, values: Mapping[str, Any], items: int, group: int | None) -> None:
+    def _across(self, width: int) -> int:
+        return -(-width // layout.PATCH_WIDTH)
+
+    def _launch_patches(
+        self,
+        name: str,
+        file: str,
+        values: Mapping[str, Any],
+        patches: int,
+        features: tuple[str, ...],
+        least: int,
+    ) -> None:
+        group = 1 if self.device.is_clang_cpu else layout.PATCH_WIDTH
+        self._launch(name, file, values, max(patches, least) * group, group, features)
+
+    def _launch(
+        self,
+        name: str,
+        file: str,
+        values: Mapping[str, Any],
+        items: int,
+        group: int | None,
+        features: tuple[str, ...],
+    ) -> None:
         own = {"width": self.width, "height": self.height}
         arguments = bindings.arguments(bindings.KERNELS[name], {**own, **values})
-        self.device.launch(self.device.kernel(name, file), items, *arguments, work_group=group)
+        kernel = self.device.kernel(name, file, features)
+        self.device.launch(kernel, items, *arguments, work_group=group)

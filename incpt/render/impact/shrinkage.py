@@ -17,33 +17,34 @@ from incpt.device.device import BUILD_SIZES, Device
 from incpt.render.film import Film, Float32Array
 from incpt.render.impact.guides import Guides
 from incpt.render.impact.patches import Patches
-from incpt.render.impact.statistics import Statistics
+from incpt.render.impact.statistics import Statistics, spread_cells
 from incpt.render.impact.sums import PAIR_SUMS
 
 _FILE = "shrinkage"
-_FIELDS = {
-    "halves": len(layout.HalfPlane),
-    "smooth_halves": len(layout.HalfPlane),
-    "details": len(layout.DetailPlane),
-    "evidence": len(layout.EvidencePlane),
-    "pooled": len(layout.EvidencePlane),
-    "shown": 3,
-}
-"""The planes with a margin that the kernels work in."""
-_POOLING_PASSES = 2
+_DETAILS = layout.SMOOTHING_SCALES + 1
+_SHARES = layout.CLASSES * _DETAILS
 
 
 class Shrinkage:
     """Makes pictures of `width` x `height` pixels from sums of pairs; holds the planes to work in."""
 
     def __init__(self, device: Device, width: int, height: int) -> None:
-        self.patches = Patches(device, width, height)
-        self.image_buffer = device.empty(16 * width * height)
+        self.patches = patches = Patches(device, width, height)
+        pixels = width * height
+        self.image_buffer = device.empty(16 * pixels)
         """The picture as of the last `update`: red, green, blue and 1, or 0 where there is no sample."""
-        size = 4 * self.patches.field_size
-        self._fields = {name: device.empty(planes * size) for name, planes in _FIELDS.items()}
-        for name, planes in _FIELDS.items():
-            device.fill(self._fields[name], 0, planes * size)
+        field_bytes = 4 * len(layout.HalfPlane) * patches.field_size
+        self._halves = device.empty(field_bytes), device.empty(field_bytes)
+        for field in self._halves:
+            # Margins are read and never written.
+            device.fill(field, 0, field_bytes)
+        self._planes = {
+            "details": device.empty(4 * 3 * _DETAILS * pixels),
+            "base_light": device.empty(4 * 3 * pixels),
+            "evidence": device.empty(4 * _SHARES * len(layout.Evidence) * patches.cells),
+            "shares": device.empty(4 * _SHARES * patches.cells),
+            "column_shares": device.empty(4 * _SHARES * width * patches.cell_rows),
+        }
 
     def update(self, film: Film, guides: Guides, statistics: Statistics) -> None:
         """Make the picture that the film has, by statistics that are up to date."""
@@ -57,8 +58,7 @@ class Shrinkage:
     def fold(self, film: Film, guides: Guides, statistics: Statistics) -> None:
         """Make the picture of the last `update` the kept one of the film, with as many samples as each pixel
         is worth, and forget the pairs."""
-        values = self._values(film, guides, statistics)
-        self.patches.launch("fold_change", "fold_change", values)
+        self.patches.launch("fold_change", "fold_change", self._values(film, guides, statistics))
         film.clear(PAIR_SUMS)
 
     def idle_launches(self, film: Film, guides: Guides, statistics: Statistics) -> list[Callable[[], None]]:
@@ -68,36 +68,31 @@ class Shrinkage:
         for size in BUILD_SIZES:
             launches += [
                 partial(self._run, nothing, values, size),
-                partial(nothing.launch, "fold_change", "fold_change", values, size),
+                partial(nothing.launch, "fold_change", "fold_change", values, least=size),
             ]
         return launches
 
     def _values(self, film: Film, guides: Guides, statistics: Statistics) -> dict[str, Any]:
         return {
-            **self._fields,
+            **self._planes,
             "anchor_sums": film.radiance_sums(),
             "pairs": film.planes(PAIR_SUMS),
             "labels": guides.labels,
             "guides": guides.weights,
             "cells": statistics.cells,
-            "cell_sums": statistics.cells,
-            "activities": statistics.activities,
+            "column_rules": statistics.column_rules,
+            "spans": statistics.spans,
             "shown_image": self.image_buffer,
         }
 
     def _run(self, patches: Patches, values: Mapping[str, Any], least: int = 1) -> None:
-        def launch(name: str, **own: Any) -> None:
-            patches.launch(name, _FILE, {**values, **own}, least)
-
-        launch("split_change")
-        fine, coarse = values["halves"], values["smooth_halves"]
-        for scale in range(layout.SMOOTHING_SCALES + 1):
-            if scale < layout.SMOOTHING_SCALES:
-                launch("smooth_change", scale_index=scale, halves=fine, smooth_halves=coarse)
-            else:
-                launch("rest_of_change", halves=fine)
+        fine, coarse = self._halves
+        patches.launch("split_change", _FILE, {**values, "halves": fine}, least=least)
+        for scale in range(layout.SMOOTHING_SCALES):
+            own = {**values, "scale_index": scale, "halves": fine, "smooth_halves": coarse}
+            features = ("LAST_SCALE",) if scale == layout.SMOOTHING_SCALES - 1 else ()
+            patches.launch("smooth_change", _FILE, own, features=features, least=least)
             fine, coarse = coarse, fine
-            last = layout.SMOOTHING_STEPS - 1
-            launch("pool_evidence", scale_index=scale)
-            launch("shrink_detail", scale_index=min(scale + 1, last))
-        launch("store_picture")
+        patches.launch_cells("judge_details", _FILE, values, _SHARES, least)
+        spread_cells(patches, _SHARES, values["shares"], values["column_shares"], least)
+        patches.launch("show_change", _FILE, values, least=least)

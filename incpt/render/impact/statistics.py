@@ -25,25 +25,31 @@ from incpt.render.impact.sums import PAIR_SUMS
 from incpt.render.impact.tile_sums import TileSums
 from incpt.render.tiles import TileGrid
 
-_CLASSES = 2
-_CELL_SUMS = _CLASSES * len(layout.CellSum)
 _FILE = "cell_statistics"
+_RULES = layout.CLASSES * len(layout.RulePlane)
 _VISIBLE = (1e-3, 14.0)
 """Radiances between which the display shows an error; AgX clips at 1.8e-4 and at 16.3."""
 
 
 class Statistics:
-    """What is known of the pairs of a picture of `width` x `height` pixels, as of the last `update`."""
+    """What is known of the pairs of a picture of `width` x `height` pixels, as of the last `update`.
+
+    cells         layout.CellPlane of each class, a float for each cell.
+    column_rules  what follows for pixels: layout.RulePlane, each for each class, interpolated along rows.
+    spans         of each patch the columns near which anything changes: the first, and that behind the last.
+    """
 
     def __init__(self, device: Device, width: int, height: int) -> None:
         self.patches = patches = Patches(device, width, height)
-        self.cells = device.empty(4 * _CLASSES * len(layout.CellPlane) * patches.cells)
-        """layout.CellPlane of both classes."""
-        self.activities = device.empty(4 * patches.count)
-        """layout.Activity of each patch."""
-        self._cell_sums = device.empty(4 * _CELL_SUMS * patches.cells)
-        cell_rows = -(-height // layout.CELL_SIZE)
-        self._columns = device.empty(4 * _CELL_SUMS * width * cell_rows)
+
+        def planes(count: int) -> cl.Buffer:
+            return device.empty(4 * count * patches.cells)
+
+        self.cells = planes(layout.CLASSES * len(layout.CellPlane))
+        self.column_rules = device.empty(4 * _RULES * width * patches.cell_rows)
+        self.spans = device.empty(8 * patches.count)
+        self._rules = planes(_RULES)
+        self._cell_sums = planes(layout.CLASSES * len(layout.CellSum))
         self._slopes = device.upload(squared_slopes())
 
     def update(self, film: Film, guides: Guides) -> None:
@@ -53,24 +59,22 @@ class Statistics:
     def tile_sums(self, film: Film, guides: Guides, grid: TileGrid) -> TileSums:
         """Sums over the tiles of a grid over the picture, from what the film has; variances of the picture
         are those of the last `update`. It waits for the device."""
-        rows = grid.rows * len(layout.TileSum)
-        columns = self.patches.device.empty(4 * rows * grid.width)
-        sums = self.patches.device.empty(4 * rows * grid.columns)
-        values = self._values(film, guides) | {"columns": columns}
-        self.patches.launch_columns("tile_columns", "tile_columns", values, grid.tile_size)
-        self._sum_columns(rows, grid.width, grid.tile_size, columns, sums)
-        found = self.patches.device.read(sums, np.empty((len(layout.TileSum), grid.count), np.float32))
+        device, rows = self.patches.device, grid.rows * len(layout.TileSum)
+        columns, sums = device.empty(4 * rows * grid.width), device.empty(4 * rows * grid.columns)
+        self._sum_columns(self.patches, grid, self._values(film, guides) | {"columns": columns}, sums)
+        found = device.read(sums, np.empty((len(layout.TileSum), grid.count), np.float32))
         named = {one.name.lower(): found[one].astype(np.float64) for one in layout.TileSum}
         return TileSums(pixels=_tile_pixels(grid), **named)
 
     def idle_launches(self, film: Film, guides: Guides) -> list[Callable[[], None]]:
         """The launches of all kernels, with nothing to do; see `Device.built`."""
-        values, nothing = self._values(film, guides), self.patches.nothing
+        values, nothing = self._values(film, guides) | {"columns": self._cell_sums}, self.patches.nothing
+        grid = TileGrid(1, 0, 1)
         launches: list[Callable[[], None]] = []
         for size in BUILD_SIZES:
             launches += [
                 partial(self._pool, nothing, values, size),
-                partial(nothing.launch_columns, "tile_columns", "tile_columns", values, 1, size),
+                partial(self._sum_columns, nothing, grid, values, self._cell_sums, size),
             ]
         return launches
 
@@ -79,32 +83,40 @@ class Statistics:
             "anchor_sums": film.radiance_sums(),
             "pairs": film.planes(PAIR_SUMS),
             "labels": guides.labels,
-            "columns": self._columns,
             "cell_sums": self._cell_sums,
             "cells": self.cells,
-            "activities": self.activities,
+            "rules": self._rules,
+            "spans": self.spans,
             "slopes": self._slopes,
         }
 
     def _pool(self, patches: Patches, values: Mapping[str, Any], least: int = 1) -> None:
-        patches.launch_columns("cell_columns", _FILE, values, layout.CELL_SIZE, least)
-        cell_rows = _CELL_SUMS * -(-patches.height // layout.CELL_SIZE)
-        self._sum_columns(cell_rows, patches.width, layout.CELL_SIZE, self._columns, self._cell_sums, least)
-        patches.launch_items("pool_cells", _FILE, values, max(_CLASSES * patches.cells, least))
-        patches.launch_items("mark_patches", _FILE, values, max(patches.count, least))
+        patches.launch("measure_cells", _FILE, values, least=least)
+        patches.launch_cells("pool_cells", _FILE, values, layout.CLASSES, least)
+        spread_cells(patches, _RULES, self._rules, self.column_rules, least)
+        patches.launch_items("find_spans", _FILE, values, max(patches.count, least))
 
     def _sum_columns(
-        self, rows: int, columns: int, count: int, sums: cl.Buffer, squares: cl.Buffer, least: int = 1
+        self, patches: Patches, grid: TileGrid, values: Mapping[str, Any], sums: cl.Buffer, least: int = 1
     ) -> None:
-        values = {
+        own = {**values, "row_count": grid.tile_size}
+        patches.launch("tile_columns", "tile_columns", own, rows=grid.tile_size, least=least)
+        rows = grid.rows * len(layout.TileSum)
+        own = {
             "row_total": rows,
-            "column_total": columns,
-            "column_count": count,
-            "column_sums": sums,
-            "square_sums": squares,
+            "column_total": grid.width,
+            "column_count": grid.tile_size,
+            "column_sums": values["columns"],
+            "square_sums": sums,
         }
-        items = max(rows * -(-columns // count), least)
-        self.patches.launch_items("sum_columns", "sum_columns", values, items)
+        patches.launch_items("sum_columns", "sum_columns", own, max(rows * grid.columns, least))
+
+
+def spread_cells(patches: Patches, planes: int, cells: cl.Buffer, columns: cl.Buffer, least: int = 1) -> None:
+    """Interpolate planes with a float for each cell along the rows: to `columns`, with a float for each
+    column of pixels of each row of cells."""
+    values = {"plane_total": planes, "cell_values": cells, "column_values": columns}
+    patches.launch_rows("spread_cells", _FILE, values, planes * patches.cell_rows, least)
 
 
 @cache

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core.layout import CELL_SIZE, SMOOTHING_SCALES, SMOOTHING_STEPS, PairPlane
+from incpt.core.layout import CELL_SIZE, GUIDE_UNIT, SMOOTHING_SCALES, PairPlane
 
 Array = npt.NDArray[np.float64]
 HALVES = 2
@@ -96,21 +96,22 @@ class Guides:
         weights = np.zeros((9, height, width))
         for i, (dy, dx) in enumerate(neighbours(step)):
             inside, labels = shifted(np.ones_like(self.labels), dy, dx), shifted(self.labels, dy, dx)
-            normals = shifted(self.normals, dy, dx)
+            changed, normals = shifted(self.changed, dy, dx), shifted(self.normals, dy, dx)
             cosine = np.clip((self.normals * normals).sum(-1), 0, 1)
             surface = (self.normals != 0).any(-1) | (normals != 0).any(-1)
-            alike = np.where(surface, np.floor(cosine**16 * 255 + 0.5) / 255, 1.0)
+            same = inside * (labels == self.labels) * (changed == self.changed)
             kernel = (2 - abs(dy) // step) * (2 - abs(dx) // step) / 4
-            weights[i] = kernel * (1.0 if dx == dy == 0 else alike * inside * (labels == self.labels))
-        return weights / weights.sum(0)
+            weights[i] = kernel * (1.0 if dx == dy == 0 else same * np.where(surface, cosine**16, 1))
+        weights = np.floor(weights / weights.sum(0) * GUIDE_UNIT + 0.5) / GUIDE_UNIT
+        weights[4] = 1 - (weights.sum(0) - weights[4])
+        return weights
 
     def smoothed(self, values: Array, scale: int) -> Array:
         """Guided means of (H, W, N) values, from neighbours 2^scale pixels away."""
-        step = 2**scale
-        weights = self.weights(step)
+        weights = self.weights(2**scale)
         return sum(
             weight[..., None] * shifted(values, dy, dx)
-            for weight, (dy, dx) in zip(weights, neighbours(step), strict=True)
+            for weight, (dy, dx) in zip(weights, neighbours(2**scale), strict=True)
         )
 
 
@@ -131,11 +132,12 @@ def shifted(values: npt.NDArray, dy: int, dx: int) -> npt.NDArray:
 
 @dataclass
 class Spread:
-    """(H, W) degrees of freedom, and sums of squares and products of deviations from a pixel's mean."""
+    """(H, W) degrees of freedom of new samples, pairs that tell of old ones, and sums of squares and products
+    of deviations: of new samples from their mean, of old ones from the refined old picture."""
 
     freedom_new: Array
     squares_new: Array
-    freedom_pairs: Array
+    pairs: Array
     squares_old: Array
     products: Array
 
@@ -143,57 +145,60 @@ class Spread:
 def spread_of(state: State) -> Spread:
     samples, pairs = state.samples.sum(0), state.pairs.sum(0)
     x, y = state.new.sum(0), state.old.sum(0)
-    per_sample, per_pair = 1 / np.maximum(samples, 1), 1 / np.maximum(pairs, 1)
+    per_sample, refined = 1 / np.maximum(samples, 1), np.maximum(state.kept + pairs, 1)
     squares_new = np.maximum(state.new_moment - (x * x).mean(-1) * per_sample, 0)
-    squares_old = np.maximum(state.old_moment - (y * y).mean(-1) * per_pair, 0)
-    products = state.joint_moment - (x * y).mean(-1) * per_sample
-    # Pairs are taken from the mean of all samples; see the test of its expectation.
-    excess = np.maximum(pairs * (samples - 1) * per_sample, 1e-20)
+    squares_old = np.maximum(state.old_moment - (y * y).mean(-1) / refined, 0)
+    pair_share = pairs * per_sample / refined
+    products = state.joint_moment - pair_share * (x * y).mean(-1)
+    usable = (state.kept >= 1) & (pairs > 0)
+    products = (products - squares_old / refined) / np.where(usable, 1 - pair_share, 1)
     return Spread(
         np.maximum(samples - 1, 0),
         np.where(samples >= 2, squares_new, 0),
-        np.maximum(pairs - 1, 0),
-        np.where(pairs >= 2, squares_old, 0),
-        np.where(pairs >= 2, products * (pairs - 1) / excess, 0),
+        np.where(usable, pairs, 0),
+        np.where(usable, squares_old, 0),
+        np.where(usable, products, 0),
     )
 
 
 @dataclass
 class Known:
-    """(H, W) what the pixels around a pixel tell of its samples; see layout.CellPlane."""
+    """(rows, columns) of cells: what the pixels of one class in and around each tell: layout.CellPlane."""
 
     new_variance: Array
     old_variance: Array
     covariance: Array
+    new_moment: Array
     freedom_new: Array
-    freedom_pairs: Array
+    pairs: Array
     touched: Array
 
 
-def known(state: State, changed: npt.NDArray[np.bool_], enough: float = 300, most_around: int = 2) -> Known:
-    spread, shape = spread_of(state), state.kept.shape
-    terms = [
-        spread.freedom_new,
-        spread.squares_new,
-        spread.freedom_pairs,
-        spread.squares_old,
-        spread.products,
-    ]
-    result = np.zeros((6, *shape))
+def known(state: State, changed: npt.NDArray[np.bool_], enough: float = 300) -> list[Known]:
+    """For pixels that did not change, and for those that did."""
+    spread, result = spread_of(state), []
+    terms = [state.samples.sum(0), spread.pairs, spread.freedom_new, spread.squares_new, state.new_moment]
+    terms += [spread.squares_old, spread.products, state.touched]
     for class_of_pixels in (False, True):
-        here = changed == class_of_pixels
-        cells = np.stack([cell_sums(term * here) for term in (*terms, state.touched)])
-        wide = cells
-        for around in range(1, most_around + 1):
-            few = wide[0] < enough
-            wide = np.where(few, sums_around(cells, around), wide)
-        spread_out = np.repeat(np.repeat(wide, CELL_SIZE, 1), CELL_SIZE, 2)[:, : shape[0], : shape[1]]
-        result = np.where(here, spread_out, result)
-    freedom_new, squares_new, freedom_pairs, squares_old, products, touched = result
-    new_variance = squares_new / np.maximum(freedom_new, 1)
-    old_variance = squares_old / np.maximum(freedom_pairs, 1)
-    covariance = np.clip(products / np.maximum(freedom_pairs, 1), 0, np.sqrt(new_variance * old_variance))
-    return Known(new_variance, old_variance, covariance, freedom_new, freedom_pairs, touched)
+        cells = np.stack([cell_sums(term * (changed == class_of_pixels)) for term in terms])
+        wide = sums_around(cells, 2)
+        if not class_of_pixels:
+            near = sums_around(cells, 1)
+            wide = np.where(cells[0] >= enough, cells, np.where(near[0] >= enough, near, wide))
+        samples, pairs, freedom, squares_new, new_moment, squares_old, products, touched = wide
+        per_pair = 1 / np.maximum(pairs, 1)
+        result.append(
+            Known(
+                squares_new / np.maximum(freedom, 1),
+                squares_old * per_pair,
+                np.maximum(products * per_pair, 0),
+                new_moment / np.maximum(samples, 1),
+                freedom,
+                pairs,
+                touched,
+            )
+        )
+    return result
 
 
 def cell_sums(values: Array) -> Array:
@@ -211,11 +216,67 @@ def sums_around(cells: Array, around: int) -> Array:
     return sum(padded[:, i : i + rows, j : j + columns] for i in edge for j in edge)
 
 
-def old_weight(state: State, about: Known) -> Array:
-    samples, pairs = np.maximum(state.samples.sum(0), 1), state.pairs.sum(0)
-    equal = (state.kept + pairs) / (state.kept + samples)
-    weight = (about.covariance * pairs / samples + 1e-8 * equal) / (about.old_variance + 1e-8)
-    return np.where(about.freedom_pairs < 0.5, equal, np.clip(weight, 0, 1.5))
+def to_pixels(of_classes: list[Array], changed: npt.NDArray[np.bool_], interpolated: bool = True) -> Array:
+    """(H, W) from values of cells for each class, between the centres of cells or not."""
+    y, x = ((np.arange(size) + 0.5) / CELL_SIZE - 0.5 for size in changed.shape)
+    if not interpolated:
+        y, x = np.floor(y + 0.5), np.floor(x + 0.5)
+    result = []
+    for cells in of_classes:
+        (y0, y1), (x0, x1) = (
+            np.clip([np.floor(at), np.floor(at) + 1], 0, count - 1).astype(int)
+            for at, count in zip((y, x), cells.shape, strict=True)
+        )
+        fx, fy = x - np.floor(x), (y - np.floor(y))[:, None]
+        upper, lower = (cells[r][:, x0] * (1 - fx) + cells[r][:, x1] * fx for r in (y0, y1))
+        result.append(upper * (1 - fy) + lower * fy)
+    return np.where(changed, result[1], result[0])
+
+
+@dataclass
+class Rule:
+    """What follows from `Known`; see layout.RulePlane."""
+
+    old_weight: Array
+    base_share: Array
+    variance: Array
+    prior: Array
+    covered: Array
+
+
+def rules(about: list[Known]) -> list[Rule]:
+    result = []
+    for i, one in enumerate(about):
+        fitting = np.minimum((one.covariance + 1e-8) / (one.old_variance + 1e-8), 1.5)
+        weight = np.where(one.pairs > 0, fitting, 1)
+        share = one.freedom_new / (one.freedom_new + 4)
+        resemblance = np.where(one.touched > 0, np.clip(1.5 * weight - 0.5, 0, 1), 1)
+        result.append(
+            Rule(
+                weight,
+                resemblance if i else np.ones_like(weight),
+                share * one.new_variance + i * (1 - share) * one.new_moment,
+                (1 - i) * 0.5 * (1 - share),
+                share * (2 * one.covariance - weight * one.old_variance),
+            )
+        )
+    return result
+
+
+def rule_of_pixels(about: list[Known], changed: npt.NDArray[np.bool_], interpolated: bool = True) -> Rule:
+    """(H, W) each."""
+    of_classes = rules(about)
+    names = Rule.__dataclass_fields__
+    return Rule(*(to_pixels([getattr(r, name) for r in of_classes], changed, interpolated) for name in names))
+
+
+def touched_around(about: list[Known], changed: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """(H, W) whether a sample that met a change is behind what is known of a pixel."""
+    return to_pixels([one.touched for one in about], changed, interpolated=False) > 0
+
+
+def pair_weight(state: State, rule: Rule) -> Array:
+    return rule.old_weight * state.pairs.sum(0) / np.maximum(state.samples.sum(0), 1)
 
 
 def refinement(state: State) -> Array:
@@ -224,38 +285,40 @@ def refinement(state: State) -> Array:
     return state.old.sum(0) / count[..., None]
 
 
-def changes(state: State, weight: Array) -> Array:
-    """(2, H, W, 3) what each half shows beside the refined old picture."""
-    base = refinement(state)
+def changes(state: State, weight: Array, base: Array | None = None) -> Array:
+    """(2, H, W, 3) what each half shows beside a base, by default the refined old picture, with such a weight
+    of old values."""
+    refined = refinement(state)
     new_mean = state.new / np.maximum(state.samples, 1)[..., None]
     old_mean = state.old / np.maximum(state.pairs, 1)[..., None]
     used = np.where(state.pairs > 0, weight, 0)[..., None]
-    change = new_mean - base - used * (old_mean - base)
+    change = new_mean - used * (old_mean - refined) - (refined if base is None else base - state.anchor)
     return np.where(state.samples[..., None] > 0, change, 0)
 
 
-def sample_variance(state: State, about: Known, weight: Array) -> Array:
-    samples, pairs = np.maximum(state.samples.sum(0), 1), state.pairs.sum(0)
-    share = np.where(pairs > 0, weight * state.kept / np.maximum(state.kept + pairs, 1e-20), 0)
-    old = weight * share * about.old_variance * samples / np.maximum(pairs, 1)
-    return np.maximum(about.new_variance - 2 * share * about.covariance + old, 1e-12)
+def sample_variance(state: State, rule: Rule) -> Array:
+    kept_share = state.kept / np.maximum(state.kept + state.pairs.sum(0), 1e-20)
+    guess = rule.prior * ((state.anchor**2).mean(-1) + 1e-6)
+    return np.maximum(rule.variance + guess - rule.covered * pair_weight(state, rule) * kept_share, 1e-12)
 
 
-def shown_variance(state: State, about: Known) -> Array:
-    refined = about.new_variance / np.maximum(state.kept + state.pairs.sum(0), 1)
-    changed = sample_variance(state, about, old_weight(state, about)) / np.maximum(state.samples.sum(0), 1)
-    return np.where(about.touched > 0, changed, refined)
+def shown_variance(state: State, about: list[Known], changed: npt.NDArray[np.bool_]) -> Array:
+    rule = rule_of_pixels(about, changed, interpolated=False)
+    old_variance = to_pixels([one.old_variance for one in about], changed, interpolated=False)
+    refined = old_variance / np.maximum(state.kept + state.pairs.sum(0), 1)
+    of_change = sample_variance(state, rule) / np.maximum(state.samples.sum(0), 1)
+    return np.where(touched_around(about, changed), of_change, refined)
 
 
 def picture(state: State, guides: Guides) -> Array:
     """(H, W, 3) what is shown."""
     about = known(state, guides.changed)
-    weight = old_weight(state, about)
-    change = np.where((about.touched > 0)[..., None], changes(state, weight), 0)
-    freedom = about.freedom_new
-    prior = 0.5 * ((state.anchor**2).mean(-1) + 1e-6)
-    variance = (freedom * sample_variance(state, about, weight) + 4 * prior) / (freedom + 4)
-    return state.anchor + refinement(state) + shrunk(change, state.samples, variance, guides)
+    rule = rule_of_pixels(about, guides.changed)
+    touched = touched_around(about, guides.changed)[..., None]
+    refined = state.anchor + refinement(state)
+    base = np.where(touched, rule.base_share[..., None], 1) * refined
+    change = np.where(touched, changes(state, pair_weight(state, rule), base), 0)
+    return base + shrunk(change, state.samples, sample_variance(state, rule), guides)
 
 
 def shrunk(change: Array, samples: Array, variance: Array, guides: Guides) -> Array:
@@ -277,35 +340,44 @@ def shrunk(change: Array, samples: Array, variance: Array, guides: Guides) -> Ar
         else:
             details, coarse, coarse_weights = change, change, weights
         details = np.where((weights > 0)[..., None], details, 0)
-        total += shown_of_detail(details, weights, scale, guides)
+        total += shown_of_detail(details, weights, scale, guides.changed)
         change, weights = coarse, coarse_weights
     return total
 
 
-def shown_of_detail(details: Array, weights: Array, scale: int, guides: Guides) -> Array:
+def shown_of_detail(details: Array, weights: Array, scale: int, changed: npt.NDArray[np.bool_]) -> Array:
     both, weight = (weights > 0).all(0), weights.sum(0)
-    shares = weights / np.maximum(weight, 1e-300)
-    mean = (shares[..., None] * details).sum(0)
-    signal = (details[0] * details[1]).mean(-1)
-    noise = np.where(both, ((details[0] - details[1]) ** 2).mean(-1) * shares[0] * shares[1], 0)
-    counts = both & (details != 0).any((0, 3))
-    evidence_weight = np.where(counts, 1 / (0.05 * noise + 1 / np.maximum(weight, 1e-300) + 1e-12), 0)
-    evidence = np.stack([signal, noise, np.ones_like(noise)], -1) * evidence_weight[..., None]
-    for i in range(2):
-        evidence = guides.smoothed(evidence, min(scale + i, SMOOTHING_STEPS - 1))
-    strength = np.maximum(evidence[..., 0], 0)
-    all_of_it = strength + np.maximum(evidence[..., 1], 0.05 * noise * evidence[..., 2])
-    share = np.where(all_of_it > 0, strength / np.maximum(all_of_it, 1e-300), 0)
-    shows = both if scale == 0 else weight > 0
-    return np.where(shows, share, 0)[..., None] * mean
+    parts = weights / np.maximum(weight, 1e-300)
+    mean = (parts[..., None] * details).sum(0)
+    count = np.where(both, np.sqrt(weight), 0)
+    signal = count * (details[0] * details[1]).mean(-1)
+    noise = count * ((details[0] - details[1]) ** 2).mean(-1) * parts[0] * parts[1]
+    shares = []
+    for class_of_pixels in (False, True):
+        here = changed == class_of_pixels
+        strength, noisy = (tent(cell_sums(values * here)) for values in (signal, noise))
+        strength = np.maximum(strength, 0)
+        shares.append(np.where(strength > 0, strength / np.maximum(strength + noisy, 1e-300), 0))
+    share = to_pixels(shares, changed)
+    return np.where(both if scale == 0 else weight > 0, share, 0)[..., None] * mean
 
 
-def worth(state: State, about: Known) -> Array:
+def tent(cells: Array) -> Array:
+    """Sums with neighbouring cells, those at the sides half and those at the corners a quarter."""
+    padded = np.pad(cells, 1)
+    rows, columns = cells.shape
+    parts = [(i, j, (2 - abs(i - 1)) * (2 - abs(j - 1)) / 4) for i in range(3) for j in range(3)]
+    return sum(part * padded[i : i + rows, j : j + columns] for i, j, part in parts)
+
+
+def worth(state: State, about: list[Known], changed: npt.NDArray[np.bool_]) -> Array:
     """(H, W) samples that the shown picture is worth."""
     samples, refined = state.samples.sum(0), state.kept + state.pairs.sum(0)
-    variances = about.new_variance * about.old_variance
-    unknown = (about.freedom_pairs < 0.5) | (variances <= 0)
-    correlation = np.where(unknown, 0, about.covariance**2 / np.where(unknown, 1, variances))
-    kept_share = np.where(about.touched > 0, np.minimum(correlation, 1), 1)
+    shares = []
+    for one in about:
+        variance = (one.freedom_new * one.new_variance + one.new_moment) / (one.freedom_new + 1)
+        correlation = one.covariance**2 / np.maximum(variance * one.old_variance, 1e-300)
+        shares.append(np.where(one.touched > 0, np.minimum(correlation, 1), 1))
+    kept_share = to_pixels(shares, changed, interpolated=False)
     per_worth = (1 - kept_share) / np.maximum(samples, 1) + kept_share / np.maximum(refined, 1e-20)
     return np.where(samples > 0, 1 / per_worth, state.kept)

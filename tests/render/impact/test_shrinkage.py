@@ -112,9 +112,9 @@ def test_shrinkage_takes_noise_away(device: Device, spp: int, most: float) -> No
     edit, state = sampled(160, 96, spp)
     rig = Rig(device, 160, 96)
     rig.load(state, edit.guides)
-    about = reference.known(state, edit.guides.changed)
+    rule = reference.rule_of_pixels(reference.known(state, edit.guides.changed), edit.guides.changed)
     samples = state.samples / np.maximum(state.samples.sum(0), 1)
-    change = (reference.changes(state, reference.old_weight(state, about)) * samples[..., None]).sum(0)
+    change = (reference.changes(state, reference.pair_weight(state, rule)) * samples[..., None]).sum(0)
     plain = error(state.anchor + reference.refinement(state) + change, edit.new)
     assert error(rig.picture(), edit.new) < most * plain
     assert error(rig.picture(), edit.new) < 0.5 * error(state.anchor, edit.new)
@@ -232,10 +232,11 @@ def test_folding_keeps_the_picture_and_its_worth(device: Device) -> None:
     rig.fold()
     sums = rig.film.sums()
     assert not sums[PAIR_SUMS.name].any()
-    expected = reference.worth(state, reference.known(state, edit.guides.changed))
+    about = reference.known(state, edit.guides.changed)
+    expected = reference.worth(state, about, edit.guides.changed)
     np.testing.assert_allclose(sums[RADIANCE.name][3], expected, rtol=2e-3)
     np.testing.assert_allclose(rig.film.image()[..., :3], shown, atol=1e-5)
-    untouched = reference.known(state, edit.guides.changed).touched == 0
+    untouched = ~reference.touched_around(about, edit.guides.changed)
     assert untouched.any()
     np.testing.assert_allclose(expected[untouched], made_up.KEPT + 3)
     assert (

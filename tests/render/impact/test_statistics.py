@@ -7,13 +7,14 @@ import pytest
 from render.impact import made_up, reference
 from render.impact.made_up import Rig
 
-from incpt.core.layout import CELL_SIZE, PATCH_HEIGHT, PATCH_WIDTH, Activity, CellPlane
+from incpt.core.layout import CELL_SIZE, CLASSES, PATCH_WIDTH, CellPlane, RulePlane
 from incpt.device.device import Device
 from incpt.picture.tone_mapping import display_values
 from incpt.render.impact.statistics import squared_slopes
 from incpt.render.tiles import TileGrid
 
 WIDTH, HEIGHT = 70, 45
+ROWS, COLUMNS = -(-HEIGHT // CELL_SIZE), -(-WIDTH // CELL_SIZE)
 
 
 @pytest.fixture(scope="module")
@@ -35,71 +36,82 @@ def update(rig: Rig, edit: made_up.Edit, state: reference.State) -> None:
     rig.statistics.update(rig.film, rig.guides)
 
 
-def cells_of_pixels(rig: Rig, changed: np.ndarray) -> list[np.ndarray]:
-    """(H, W) of each plane, from the cell and class of each pixel."""
-    rows, columns = -(-HEIGHT // CELL_SIZE), -(-WIDTH // CELL_SIZE)
-    cells = np.empty((2, len(CellPlane), rows, columns), np.float32)
-    rig.film.device.read(rig.statistics.cells, cells)
-    y, x = np.mgrid[:HEIGHT, :WIDTH] // CELL_SIZE
-    return [np.where(changed, cells[1, plane, y, x], cells[0, plane, y, x]) for plane in CellPlane]
+def cells(rig: Rig) -> np.ndarray:
+    """(classes, planes, rows, columns)"""
+    found = np.empty((CLASSES, len(CellPlane), ROWS, COLUMNS), np.float32)
+    return rig.film.device.read(rig.statistics.cells, found)
 
 
 @pytest.mark.parametrize(("spp", "singles"), [(0, 0), (1, 0), (2, 0), (5, 0), (12, 0), (0, 3), (3, 4)])
 def test_cells_equal_the_reference(rig: Rig, spp: int, singles: int) -> None:
     edit, state = sampled(spp, singles)
     update(rig, edit, state)
-    about = reference.known(state, edit.guides.changed)
-    found = cells_of_pixels(rig, edit.guides.changed)
-    for plane in CellPlane:
-        expected = getattr(about, plane.name.lower())
-        np.testing.assert_allclose(found[plane], expected, rtol=1e-3, atol=1e-5, err_msg=plane.name)
+    found = cells(rig)
+    for i, about in enumerate(reference.known(state, edit.guides.changed)):
+        for plane in CellPlane:
+            expected = getattr(about, plane.name.lower())
+            np.testing.assert_allclose(found[i, plane], expected, rtol=1e-3, atol=1e-5, err_msg=plane.name)
 
 
-def test_a_class_that_a_cell_lacks_says_nothing_there(rig: Rig) -> None:
+@pytest.mark.parametrize(("spp", "singles"), [(0, 0), (1, 0), (5, 0), (3, 4)])
+def test_rules_equal_the_reference(rig: Rig, spp: int, singles: int) -> None:
+    edit, state = sampled(spp, singles)
+    update(rig, edit, state)
+    columns = np.empty((len(RulePlane), CLASSES, ROWS, WIDTH), np.float32)
+    rig.film.device.read(rig.statistics.column_rules, columns)
+    x, centres = np.arange(WIDTH) + 0.5, (np.arange(COLUMNS) + 0.5) * CELL_SIZE
+    for i, expected in enumerate(reference.rules(reference.known(state, edit.guides.changed))):
+        for plane in RulePlane:
+            rows = getattr(expected, plane.name.lower())
+            interpolated = [np.interp(x, centres, row) for row in rows]
+            np.testing.assert_allclose(
+                columns[plane, i], interpolated, rtol=2e-3, atol=1e-5, err_msg=plane.name
+            )
+
+
+def test_a_class_that_is_not_there_says_nothing(rig: Rig) -> None:
     edit, state = sampled(4)
     edit.guides.changed[:] = False
     update(rig, edit, state)
-    rows, columns = -(-HEIGHT // CELL_SIZE), -(-WIDTH // CELL_SIZE)
-    cells = np.empty((2, len(CellPlane), rows, columns), np.float32)
-    rig.film.device.read(rig.statistics.cells, cells)
-    assert cells[0, CellPlane.FREEDOM_NEW].all() and not cells[1].any()
+    found = cells(rig)
+    assert found[0, CellPlane.FREEDOM_NEW].all() and not found[1].any()
 
 
 def test_few_samples_are_pooled_over_neighbours_of_their_class(rig: Rig) -> None:
     edit, state = sampled(2)
-    update(rig, edit, state)
-    freedom = cells_of_pixels(rig, edit.guides.changed)[CellPlane.FREEDOM_NEW]
-    inner = freedom[16:24, 32:40]
-    assert (inner > CELL_SIZE**2).all()  # one degree of freedom for each pixel of more than one cell
     changed = edit.guides.changed
-    assert freedom[changed].max() <= changed.sum()
+    update(rig, edit, state)
+    few = cells(rig)[:, CellPlane.FREEDOM_NEW]
+    assert few[0, 2, 4] > CELL_SIZE**2  # one degree of freedom for each pixel, of more than one cell
     edit, state = sampled(12)
     update(rig, edit, state)
-    freedom = cells_of_pixels(rig, np.zeros_like(changed))[CellPlane.FREEDOM_NEW]
-    assert freedom[:8, :8].max() == 11 * CELL_SIZE**2  # enough, so that no neighbour is asked
+    many = cells(rig)[:, CellPlane.FREEDOM_NEW]
+    assert many[0, 0, 0] == 11 * CELL_SIZE**2  # enough, so that no neighbour is asked
+    # Changed objects take in all around always, and nothing of the other class.
+    np.testing.assert_array_equal(many[1], 11 * few[1])
+    assert many[1].max() <= 11 * changed.sum()
 
 
-@pytest.mark.parametrize(("pairs", "singles"), [(2, 0), (3, 2), (2, 5)])
-def test_variances_and_covariance_are_right_on_average(pairs: int, singles: int) -> None:
-    """Also where samples without partners move the mean that pairs are taken from."""
-    rng = np.random.default_rng(3)
-    spreads = []
-    for _ in range(60):
-        state = reference.State.empty(np.full((32, 32, 3), 0.7), 64)
+@pytest.mark.parametrize("kept", [1, 4, 256])
+@pytest.mark.parametrize(("pairs", "singles"), [(1, 0), (2, 0), (3, 2), (2, 5)])
+def test_variances_and_covariance_are_right_on_average(pairs: int, singles: int, kept: int) -> None:
+    """Also after one pair, where the kept picture is noisy itself, and where samples without partners move
+    the mean of the new ones."""
+    rng, spreads, count = np.random.default_rng(3), [], 80
+    for _ in range(count):
+        noise = rng.normal(size=(32, 32, 3)) / np.sqrt(kept)
+        state = reference.State.empty(0.7 + noise, kept)
         for index in range(pairs + singles):
             common = rng.normal(size=(32, 32, 3))
-            new = 1 + common + 0.5 * rng.normal(size=common.shape)
+            new = 1 + 0.8 * common + 0.5 * rng.normal(size=common.shape)
             state.add(index, new, 0.7 + common, np.ones((32, 32), bool), single=index >= pairs)
         spread = reference.spread_of(state)
-        spreads.append(
-            [
-                spread.squares_new.sum() / spread.freedom_new.sum(),
-                spread.squares_old.sum() / spread.freedom_pairs.sum(),
-                spread.products.sum() / spread.freedom_pairs.sum(),
-            ]
-        )
-    mean, error = np.mean(spreads, 0), np.std(spreads, 0) / np.sqrt(60)
-    assert (np.abs(mean - [1.25, 1, 1]) < 4 * error).all(), (mean, error)
+        new_variance = spread.squares_new.sum() / max(spread.freedom_new.sum(), 1)
+        spreads.append([new_variance, spread.squares_old.sum() / spread.pairs.sum()])
+        spreads[-1].append(spread.products.sum() / spread.pairs.sum())
+    mean, error = np.mean(spreads, 0), np.std(spreads, 0) / np.sqrt(count)
+    expected = [0.89 if pairs + singles > 1 else 0, 1, 0.8]
+    assert (np.abs(mean - expected) <= 4 * error).all(), (mean, error)
 
 
 @pytest.mark.parametrize("tile_size", [1, 5, 8, 16, 33, 1024])
@@ -119,12 +131,12 @@ def test_tile_sums(rig: Rig, tile_size: int) -> None:
         "touched": state.touched,
         "kept": state.kept,
         "freedom_new": spread.freedom_new,
-        "freedom_pairs": spread.freedom_pairs,
+        "freedom_pairs": spread.pairs,
         "squares_new": weight * spread.squares_new,
         "squares_old": weight * spread.squares_old,
         "products": weight * spread.products,
         "differences": weight * np.maximum(among_pairs + state.old_moment - 2 * state.joint_moment, 0),
-        "error": weight * reference.shown_variance(state, about),
+        "error": weight * reference.shown_variance(state, about, edit.guides.changed),
     }
     tiles = grid.tile_of_pixels().ravel()
     for name, values in expected.items():
@@ -162,14 +174,24 @@ def test_weights_of_black_and_of_glaring_pixels(rig: Rig, radiance: float) -> No
     assert weight == pytest.approx(expected, rel=1e-3) and weight > 0
 
 
-def test_patches_near_a_change_are_marked(rig: Rig, device: Device) -> None:
-    edit, state = sampled(0)
+def test_spans_reach_from_the_first_to_the_last_change_nearby(device: Device) -> None:
+    width, height = 2 * PATCH_WIDTH + 30, 90
+    rig = Rig(device, width, height)
+    state = reference.State.empty(np.ones((height, width, 3)), 64)
     state.samples[:] = state.pairs[:] = 20  # enough that no neighbouring cells are asked
-    state.touched[4, 66] = 1
-    update(rig, edit, state)
-    columns, rows = -(-WIDTH // PATCH_WIDTH), -(-HEIGHT // PATCH_HEIGHT)
-    marks = device.read(rig.statistics.activities, np.empty((rows, columns), np.uint32))
-    # The cell at (64, 0): up to two cells away the picture may change, and two more are smoothed.
-    expected = np.zeros((rows, columns), np.uint32)
-    expected[:5, 1:], expected[:3, 1:] = Activity.NEAR, Activity.CHANGED
-    np.testing.assert_array_equal(marks, expected)
+    state.touched[2, 300], state.touched[89, 45], state.touched[89, 91] = 1, 1, 1
+    rig.load(
+        state,
+        reference.Guides(
+            np.zeros((height, width), int), np.zeros((height, width, 3)), np.zeros((height, width), bool)
+        ),
+    )
+    rig.statistics.update(rig.film, rig.guides)
+    rows = -(-height // CELL_SIZE)
+    spans = device.read(rig.statistics.spans, np.empty((rows, 3, 2), np.uint32)).astype(int)
+    ends = np.array([PATCH_WIDTH, 2 * PATCH_WIDTH, width])
+    expected = np.repeat(ends[None, :, None], rows, 0).repeat(2, 2)
+    # Four cells to each side of the one with a change; what lies in the next patch is another's.
+    expected[:5, 1] = (37 - 4) * CELL_SIZE, (37 + 5) * CELL_SIZE
+    expected[rows - 5 :, 0] = (5 - 4) * CELL_SIZE, (11 + 5) * CELL_SIZE
+    np.testing.assert_array_equal(spans, expected)
