@@ -52,16 +52,22 @@ __kernel WIDE void measure_cells(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PA
 #define PRIOR_FREEDOM 4.0f
 #define PRIOR_VARIANCE 0.5f
 
-// A cell and those around it: its own row and the two above and below, as far as there are any.
+// Five cells in a row, or below each other, of which the middle one is a cell itself: how far away they are,
+// and 1; both are 0 where there are none.
 typedef struct {
-    int columns;
-    int rows[5];     // where the rows begin
-    float counts[5]; // 1, or 0 where there is no such row
-} CellsAround;
+    int distances[5];
+    float counts[5];
+} Five;
 
-INLINE float cell_at(__global const float *sums, const CellsAround *around, int row, int column) {
-    const int is_there = (column >= 0) & (column < around->columns);
-    return (is_there ? sums[around->rows[row] + column] : 0.0f) * around->counts[row];
+INLINE Five five_around(int place, int size, int distance) {
+    Five five;
+#pragma unroll
+    for (int i = 0; i < 5; i++) {
+        const int there = place + i - 2, is_there = (there >= 0) & (there < size);
+        five.distances[i] = is_there ? (i - 2) * distance : 0;
+        five.counts[i] = is_there ? 1.0f : 0.0f;
+    }
+    return five;
 }
 
 // Sums over a cell, over the eight around it, and over the sixteen around those.
@@ -69,32 +75,32 @@ typedef struct {
     float own, near, far;
 } Rings;
 
-INLINE Rings rings_of(__global const float *sums, const CellsAround *around, int column) {
-    Rings rings = {cell_at(sums, around, 2, column), 0.0f, 0.0f};
+INLINE Rings rings_of(__global const float *sums, size_t cell, const Five *down, const Five *across) {
+    Rings rings = {sums[cell], 0.0f, 0.0f};
 #pragma unroll
-    for (int row = 0; row < 5; row++) {
+    for (int i = 0; i < 5; i++) {
 #pragma unroll
-        for (int dx = -2; dx <= 2; dx++) {
-            const int is_far = (row == 0) | (row == 4) | (dx == -2) | (dx == 2),
-                      is_own = (row == 2) & (dx == 0);
-            const float value = cell_at(sums, around, row, column + dx);
-            rings.near += is_far | is_own ? 0.0f : value;
-            rings.far += is_far ? value : 0.0f;
+        for (int j = 0; j < 5; j++) {
+            const int is_far = (i == 0) | (i == 4) | (j == 0) | (j == 4), is_own = (i == 2) & (j == 2);
+            const float value = sums[cell + down->distances[i] + across->distances[j]];
+            const float counted = value * down->counts[i] * across->counts[j];
+            rings.near += is_far | is_own ? 0.0f : counted;
+            rings.far += is_far ? counted : 0.0f;
         }
     }
     return rings;
 }
 
 INLINE void pool_cell(__global const float *sums, __global float *cells, __global float *rules, uint total,
-                      uint class, const CellsAround *around, int column) {
-    const Rings samples_around = rings_of(sums + CELL_SUM_SAMPLES * total, around, column);
+                      uint class, size_t cell, const Five *down, const Five *across) {
+    const Rings samples_around = rings_of(sums + CELL_SUM_SAMPLES * total, cell, down, across);
     const float near_samples = samples_around.own + samples_around.near;
     const int takes_near = (class == 1u) | (samples_around.own < ENOUGH_SAMPLES);
     const int takes_far = (class == 1u) | (near_samples < ENOUGH_SAMPLES);
     float sum[CELL_SUM_PLANES];
 #pragma unroll
     for (uint i = 0u; i < CELL_SUM_PLANES; i++) {
-        const Rings rings = rings_of(sums + i * total, around, column);
+        const Rings rings = rings_of(sums + i * total, cell, down, across);
         sum[i] = rings.own + (takes_near ? rings.near : 0.0f) + (takes_near & takes_far ? rings.far : 0.0f);
     }
 
@@ -104,7 +110,7 @@ INLINE void pool_cell(__global const float *sums, __global float *cells, __globa
     const float old_variance = sum[CELL_SUM_SQUARES_OLD] / MAX(pairs, 1.0f);
     const float covariance = MAX(sum[CELL_SUM_PRODUCTS] / MAX(pairs, 1.0f), 0.0f);
     const float new_moment = sum[CELL_SUM_NEW_MOMENT] / MAX(sum[CELL_SUM_SAMPLES], 1.0f);
-    __global float *known = cells + class * CELL_PLANES * total + around->rows[2] + column;
+    __global float *known = cells + class * CELL_PLANES * total + cell;
     known[CELL_NEW_VARIANCE * total] = new_variance;
     known[CELL_OLD_VARIANCE * total] = old_variance;
     known[CELL_COVARIANCE * total] = covariance;
@@ -120,7 +126,7 @@ INLINE void pool_cell(__global const float *sums, __global float *cells, __globa
     // together with the old ones: what moved has other surfaces in its place.
     const float resemblance = CLAMP(1.5f * old_weight - 0.5f, 0.0f, 1.0f);
     const float known_share = freedom / (freedom + PRIOR_FREEDOM);
-    __global float *rule = rules + class * total + around->rows[2] + column;
+    __global float *rule = rules + class * total + cell;
     const uint next = CLASSES * total;
     rule[RULE_OLD_WEIGHT * next] = old_weight;
     rule[RULE_BASE_SHARE * next] = class == 1u && touched > 0.0f ? resemblance : 1.0f;
@@ -132,21 +138,28 @@ INLINE void pool_cell(__global const float *sums, __global float *cells, __globa
 
 // Goes over each class of each row of cells. `rules` has RulePlane for each class.
 __kernel WIDE void pool_cells(PICTURE_PARAMETERS, CELL_SUMS_PARAMETERS, CELLS_PARAMETERS, RULES_PARAMETERS) {
-    const uint rows = cell_rows(height), total = cell_count(width, height);
-    const Patch patch = patch_of(cell_columns(width), CLASSES * rows, 1u);
+    const uint in_row = cell_columns(width), rows = cell_rows(height), total = in_row * rows;
+    const Patch patch = patch_of(in_row, CLASSES * rows, 1u);
+    // Cells with two others on both sides are apart from the rest, so that those need not be asked.
+    const size_t inner_left = CLAMP(2u, patch.left, patch.right);
+    const size_t inner_right = CLAMP(MAX(in_row, 2u) - 2u, inner_left, patch.right);
+    const Patch inner = narrowed(&patch, inner_left, inner_right);
     EACH_ROW(y, patch) {
-        const uint class = (uint)y / MAX(rows, 1u);
-        const int row = (int)((uint)y % MAX(rows, 1u));
-        CellsAround around;
-        around.columns = (int)cell_columns(width);
-        for (int i = 0; i < 5; i++) {
-            const int there = row + i - 2, is_there = (there >= 0) & (there < (int)rows);
-            around.rows[i] = (is_there ? there : row) * around.columns;
-            around.counts[i] = is_there ? 1.0f : 0.0f;
-        }
+        const uint class = (uint)y / MAX(rows, 1u), row = (uint)y - class * rows;
+        const Five down = five_around((int)row, (int)rows, (int)in_row), across = five_around(2, 5, 1);
         __global const float *sums = cell_sums + class * CELL_SUM_PLANES * total;
-        EACH_PIXEL(x, patch)
-        pool_cell(sums, cells, rules, total, class, &around, (int)x);
+        EACH_COLUMN(x, inner) {
+            const size_t cell = row * in_row + x;
+            pool_cell(sums, cells, rules, total, class, cell, &down, &across);
+        }
+        for (int outer = 0; outer < 2; outer++) {
+            const Patch edge =
+                narrowed(&patch, outer ? inner.right : patch.left, outer ? patch.right : inner.left);
+            EACH_PIXEL(x, edge) {
+                const Five cut = five_around((int)x, (int)in_row, 1);
+                pool_cell(sums, cells, rules, total, class, row * in_row + x, &down, &cut);
+            }
+        }
     }
 }
 
