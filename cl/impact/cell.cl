@@ -40,6 +40,7 @@ INLINE uint cell_count(uint width, uint height) { return cell_columns(width) * c
 #endif
 #define COLUMN(columns, plane, x, patch) columns[(plane) * PATCH_WIDTH + (x) - patch.left]
 
+// All work-items of a group must come here, those of patches outside the picture too.
 INLINE void store_cell_sums(const COLUMNS float *columns, uint planes, const Patch *patch, uint width,
                             uint height, __global float *sums) {
     const uint cells = PATCH_WIDTH / CELL_SIZE, total = cell_count(width, height);
@@ -54,7 +55,7 @@ INLINE void store_cell_sums(const COLUMNS float *columns, uint planes, const Pat
         float sum = 0.0f;
         for (uint x = 0u; x < CELL_SIZE; x++)
             sum += columns[i * CELL_SIZE + x];
-        if (cell < in_row)
+        if (cell < in_row && patch->top < height)
             sums[plane * total + patch->row * in_row + cell] = sum;
     }
 }

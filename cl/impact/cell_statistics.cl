@@ -34,8 +34,7 @@ __kernel WIDE void measure_cells(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PA
             COLUMN(columns, CELL_SUM_PLANES + i, x, patch) += class.second * values[i];
         }
     }
-    if (patch.top < height)
-        store_cell_sums(columns, CLASSES * CELL_SUM_PLANES, &patch, width, height, cell_sums);
+    store_cell_sums(columns, CLASSES * CELL_SUM_PLANES, &patch, width, height, cell_sums);
 }
 
 // How many samples of unchanged objects are enough, and the cells that are looked at around one for want of

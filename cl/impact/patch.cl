@@ -21,8 +21,11 @@ typedef struct {
 #define EACH_COLUMN(x, patch) LANES EACH_PIXEL(x, patch)
 #else
 #define PATCH_ITEMS PATCH_WIDTH
-// Narrowed patches too have a work-item for each column of the whole one.
-#define EACH_PIXEL(x, patch) for (size_t x = patch.left + get_local_id(0); x < patch.right; x += PATCH_WIDTH)
+// A work-item keeps to its column of the whole patch also where that is narrowed.
+#define EACH_PIXEL(x, patch)                                                                                 \
+    for (size_t x = patch.left / PATCH_WIDTH * PATCH_WIDTH + get_local_id(0); x < patch.right;               \
+         x += PATCH_WIDTH)                                                                                   \
+        if (x >= patch.left)
 #define EACH_COLUMN(x, patch) EACH_PIXEL(x, patch)
 #endif
 
@@ -51,6 +54,12 @@ INLINE Patch narrowed(const Patch *patch, size_t left, size_t right) {
     narrow.left = left;
     narrow.right = right;
     return narrow;
+}
+
+// What of a patch is near a change; `spans` has its first column and the one behind its last.
+INLINE Patch near_change(const Patch *patch, uint height, __global const uint *spans) {
+    const uint index = patch->top < height ? patch->index : 0u;
+    return narrowed(patch, spans[2u * index], spans[2u * index + 1u]);
 }
 
 // Planes with a margin, in which kernels look around without asking where the picture ends: floats from one

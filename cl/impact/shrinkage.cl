@@ -51,10 +51,8 @@ __kernel WIDE void split_change(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PAR
                                 SPANS_PARAMETERS, COLUMN_RULES_PARAMETERS, HALVES_PARAMETERS, BASE_PARAMETERS,
                                 SHOWN_IMAGE_PARAMETERS) {
     const Patch patch = patch_of(width, height, CELL_SIZE);
-    if (patch.top >= height)
-        return;
     const size_t pixels = (size_t)width * height, size = field_size(width, height);
-    const Patch near = narrowed(&patch, spans[2u * patch.index], spans[2u * patch.index + 1u]);
+    const Patch near = near_change(&patch, height, spans);
     // On both sides of what changes the refined old picture is all there is to show.
     for (int side = 0; side < 2; side++) {
         const Patch idle = narrowed(&patch, side ? near.right : patch.left, side ? patch.right : near.left);
@@ -190,13 +188,11 @@ __kernel WIDE void smooth_change(PICTURE_PARAMETERS, LABELS_PARAMETERS, GUIDES_P
     const uint sums = CLASSES * EVIDENCE_PLANES;
 #endif
     const Patch patch = patch_of(width, height, CELL_SIZE);
-    if (patch.top >= height)
-        return;
     const size_t pixels = (size_t)width * height, size = field_size(width, height);
     const size_t step = 1u << scale_index, below = step * field_pitch(width);
     __global const uint *guide = guides + 2u * scale_index * size;
     __global float *detail_of_scale = details + 3u * scale_index * pixels;
-    const Patch near = narrowed(&patch, spans[2u * patch.index], spans[2u * patch.index + 1u]);
+    const Patch near = near_change(&patch, height, spans);
     EACH_ROW(y, near)
     EACH_COLUMN(x, near) {
         const size_t pixel = y * width + x, place = field_place(width, x, y);
@@ -269,9 +265,7 @@ __kernel WIDE void show_change(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PARA
                                BASE_PARAMETERS, DETAILS_PARAMETERS, COLUMN_SHARES_PARAMETERS,
                                SHOWN_IMAGE_PARAMETERS) {
     const Patch patch = patch_of(width, height, CELL_SIZE);
-    if (patch.top >= height)
-        return;
-    const Patch near = narrowed(&patch, spans[2u * patch.index], spans[2u * patch.index + 1u]);
+    const Patch near = near_change(&patch, height, spans);
     const size_t pixels = (size_t)width * height, size = (size_t)width * cell_rows(height);
     EACH_ROW(y, near) {
         const CellRows rows = cell_rows_around(width, height, y);

@@ -10,8 +10,9 @@ from render.impact.made_up import Rig
 from incpt.device.device import Device
 from incpt.render.film import RADIANCE
 from incpt.render.impact.sums import PAIR_SUMS
+from incpt.render.tiles import TileGrid
 
-SIZES = [(70, 45), (32, 8), (5, 3), (64, 16), (33, 50)]
+SIZES = [(70, 45), (32, 8), (5, 3), (64, 16), (33, 50), (530, 20)]
 
 
 def sampled(
@@ -296,3 +297,23 @@ def test_other_guides_take_the_place_of_the_first(device: Device) -> None:
     rig.load(state, edit.guides)
     np.testing.assert_allclose(rig.picture(), reference.picture(state, edit.guides), atol=1e-4)
     assert np.abs(rig.picture() - first).max() > 0.05
+
+
+@pytest.mark.parametrize("size", [(70, 45), (530, 20)], ids=str)
+def test_groups_of_work_items_make_the_same_picture(
+    size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on GPUs, where a work-item does a column of a patch and sums go through local memory."""
+    monkeypatch.setattr(Device, "is_clang_cpu", False)
+    device = Device()
+    edit, state = sampled(*size, 3)
+    rig = Rig(device, *size)
+    rig.load(state, edit.guides)
+    np.testing.assert_allclose(rig.picture(), reference.picture(state, edit.guides), atol=1e-4)
+    grid = TileGrid(*size, 16)
+    sums = rig.statistics.tile_sums(rig.film, rig.guides, grid)
+    samples = np.bincount(grid.tile_of_pixels().ravel(), state.samples.sum(0).ravel(), grid.count)
+    np.testing.assert_array_equal(sums.samples, samples)
+    rig.fold()
+    expected = reference.worth(state, reference.known(state, edit.guides.changed), edit.guides.changed)
+    np.testing.assert_allclose(rig.film.sums()[RADIANCE.name][3], expected, rtol=2e-3)
