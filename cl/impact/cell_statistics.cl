@@ -128,7 +128,7 @@ INLINE void pool_cell(__global const float *sums, __global float *cells, __globa
     __global float *rule = rules + class * total + cell;
     const uint next = CLASSES * total;
     rule[RULE_OLD_WEIGHT * next] = old_weight;
-    rule[RULE_BASE_SHARE * next] = class == 1u && touched > 0.0f ? resemblance : 1.0f;
+    rule[RULE_BASE_SHARE * next] = class == 1u ? resemblance : 1.0f;
     rule[RULE_VARIANCE * next] =
         known_share * new_variance + (class == 1u ? (1.0f - known_share) * new_moment : 0.0f);
     rule[RULE_PRIOR * next] = class == 1u ? 0.0f : (1.0f - known_share) * PRIOR_VARIANCE;

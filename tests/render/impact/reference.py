@@ -250,7 +250,7 @@ def rules(about: list[Known]) -> list[Rule]:
         fitting = np.minimum((one.covariance + 1e-8) / (one.old_variance + 1e-8), 1.5)
         weight = np.where(one.pairs > 0, fitting, 1)
         share = one.freedom_new / (one.freedom_new + 4)
-        resemblance = np.where(one.touched > 0, np.clip(1.5 * weight - 0.5, 0, 1), 1)
+        resemblance = np.clip(1.5 * weight - 0.5, 0, 1)
         result.append(
             Rule(
                 weight,

@@ -53,9 +53,14 @@ def test_cells_equal_the_reference(rig: Rig, spp: int, singles: int) -> None:
             np.testing.assert_allclose(found[i, plane], expected, rtol=1e-3, atol=1e-5, err_msg=plane.name)
 
 
-@pytest.mark.parametrize(("spp", "singles"), [(0, 0), (1, 0), (5, 0), (3, 4)])
-def test_rules_equal_the_reference(rig: Rig, spp: int, singles: int) -> None:
+@pytest.mark.parametrize(
+    ("spp", "singles", "brighter"), [(0, 0, 1), (1, 0, 1), (5, 0, 1), (3, 4, 1), (4, 0, 3)]
+)
+def test_rules_equal_the_reference(rig: Rig, spp: int, singles: int, brighter: float) -> None:
     edit, state = sampled(spp, singles)
+    state.new *= brighter
+    state.new_moment *= brighter**2
+    state.joint_moment *= brighter
     update(rig, edit, state)
     columns = np.empty((len(RulePlane), CLASSES, ROWS, WIDTH), np.float32)
     rig.film.device.read(rig.statistics.column_rules, columns)
