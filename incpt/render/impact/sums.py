@@ -21,6 +21,8 @@ from incpt.render.film import Film, FilmPlanes
 
 PAIR_SUMS = FilmPlanes("pairs", len(layout.PairPlane))
 """What a film has to hold for the strategy."""
+_RUN = 64
+"""Pixels of a row that a work-item does on CPUs under clang; see cl/impact/reduce_pairs.cl."""
 
 
 class OldValues(Protocol):
@@ -49,11 +51,13 @@ def reduce_pairs(film: Film, batch: Batch, slots: npt.NDArray[np.void], old: Old
     count as black, and are counted by the film. Slots with gaps may lie over others, but no two with the same
     distance of pixels, one of which has a path for a pixel, may hold it twice.
     """
+    tile_size = int(batch.params["tile_size"])
     # Slots of one distance never share a pixel, so that work-items of one launch don't write to one place.
     for step in np.unique(slots["pixel_step"]):
         groups = np.unique(slots["group_first"][slots["pixel_step"] == step]).astype(np.uint32)
-        size = len(groups) * int(batch.params["tile_size"]) ** 2
-        _launch(film, batch, old, film.device.upload(groups), len(groups), size)
+        run = _RUN if film.device.is_clang_cpu else 1
+        items = len(groups) * tile_size * -(-tile_size // run)
+        _launch(film, batch, old, film.device.upload(groups), len(groups), items)
 
 
 def idle_launches(film: Film, batch: Batch, old: OldValues) -> list[Callable[[], None]]:
