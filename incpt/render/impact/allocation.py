@@ -80,7 +80,7 @@ def worth(sums: TileSums) -> FloatArray:
     covariance = np.clip(_ratio(sums.products, sums.freedom_pairs), 0, np.sqrt(v * old))
     # A tile that is black in both scenes has no noise at all.
     rho2 = np.where(v * old > 0, covariance**2 / np.maximum(v * old, 1e-300), 1.0 * (v <= 0))
-    rho2 = np.where(sums.freedom_pairs > 0, np.minimum(rho2, 1), 0)
+    rho2 = np.where((sums.freedom_new > 0) & (sums.freedom_pairs > 0), np.minimum(rho2, 1), 0)
     rho2 = np.where(sums.touched == 0, 1.0, rho2)
     drawn = np.maximum(m, 1e-9)
     return np.where(m > 0, 1 / ((1 - rho2) / drawn + rho2 / (n0 + drawn)), 0.0)
@@ -90,7 +90,7 @@ def variances(sums: TileSums, columns: int) -> TileVariances:
     """What to believe of each tile of a grid with so many columns. Where few samples are there, the squared
     differences of pairs and the tiles around fill in."""
     pixels = np.maximum(sums.pixels, 1)
-    m, pairs, freedom = sums.samples / pixels, sums.pairs / pixels, sums.freedom_pairs / pixels
+    m, pairs, freedom = sums.samples / pixels, sums.pairs / pixels, sums.freedom_new / pixels
     v = _ratio(sums.squares_new, sums.freedom_new)
     old = _ratio(sums.squares_old, sums.freedom_pairs)
     covariance = np.clip(_ratio(sums.products, sums.freedom_pairs), 0, np.sqrt(v * old))

@@ -21,9 +21,9 @@ class TileSums:
     touched        of these samples, those that met something that changed
     kept           samples behind the anchor's picture
     freedom_new    degrees of freedom of `squares_new`: samples - 1 of each pixel, where there are two
-    freedom_pairs  of `squares_old` and `products`: pairs - 1 of each pixel
+    freedom_pairs  of `squares_old` and `products`: pairs, where there is an old picture
     squares_new    squared deviations of new samples from the mean of their pixel
-    squares_old    the same of the old values of pairs
+    squares_old    squared deviations of the old values of pairs from the old picture, which they refine
     products       products of both deviations
     differences    squared differences of the two values of a pair
     error          variances of the picture that is shown
