@@ -389,7 +389,14 @@ BODY_EDITS: dict[str, Callable[[Scene, Object, int, float, Place], Scene]] = {
     "hide": lambda s, body, n, x, p: s.with_object(body.name, visible=not body.visible),
     "remove": lambda s, body, n, x, p: s.without_object(body.name),
     "copy": lambda s, body, n, x, p: s.with_added(
-        replace(body, name=f"body {len(s.objects)}", position=(p[0], 1.2, p[2]))
+        # Neither of the same size nor at the same height: which of two faces in one plane is met is a
+        # matter of rounding, which is another one in other tables.
+        replace(
+            body,
+            name=f"body {len(s.objects)}",
+            position=(p[0], 1.21, p[2]),
+            scale=tuple((1 - 0.013 * len(s.objects)) * side for side in body.scale),
+        )
     ),
     "assign": lambda s, body, n, x, p: s.with_object(body.name, material=("glass", "metal", "green")[n % 3]),
     "colour": lambda s, body, n, x, p: s.with_material(body.material, base_color=(x, 0.5, 1 - x)),
