@@ -189,7 +189,7 @@ def _timed(
         report = session.step()
         line.step_s.append(report.seconds)
         line.tiles.append(len(report.tiles))
-        line.paths.append(report.paths)
+        line.paths.append(report.paths + report.partners)
         if line.done_step is None and report.queue_done == report.queue_length and report.mode is mode:
             line.done_step = len(line.step_s)
         watch.look(session)

@@ -44,14 +44,16 @@ _PIXEL = "a pixel (x, y)"
 @dataclass(frozen=True)
 class StepReport:
     """What a step did: its mode, the tiles it finished, the place in the queue after it (in tiles), the
-    paths it traced of the scene as it is now (those past the image's edge included), its duration in seconds,
-    how many samples were not finite (they count as black), and whether the picture shows anything of it."""
+    paths it traced of the scene as it is now (those past the image's edge included) and of the scene that it
+    is compared with (their partners), its duration in seconds, how many samples were not finite (they count
+    as black), and whether the picture shows anything of it."""
 
     mode: Mode
     tiles: npt.NDArray[np.int32]
     queue_done: int
     queue_length: int
     paths: int
+    partners: int
     seconds: float
     nonfinite: int
     is_shown: bool
@@ -183,7 +185,7 @@ class Session:
         path_buffer = path_buffer if comparison is None else path_buffer.with_pairs(self.device)
         batch = self._batch(plan.slots, path_buffer)
         step = Step(self._tracer, batch, plan, comparison, path_buffer.pairs)
-        strategy_of(settings).render(step, film)
+        partners = strategy_of(settings).render(step, film)
         nonfinite = film.take_nonfinite()
         progress = before.after_step(plan, self.scene, self._state.measured)
         self._state = replace(self._state, progress=progress, path_buffer=path_buffer)
@@ -195,6 +197,7 @@ class Session:
             queue_done=done,
             queue_length=length,
             paths=batch.path_count,
+            partners=partners,
             seconds=seconds,
             nonfinite=nonfinite,
             is_shown=comparison is not None or len(plan.finished) > 0,

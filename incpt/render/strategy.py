@@ -138,13 +138,15 @@ class Strategy(ABC):
         refinement adds."""
         return situation.mode is not Mode.REFINE
 
-    def render(self, step: Step, film: Film) -> None:
-        """Job 3: trace a step, and put what it brings into the film. It may launch kernels of its own over
-        all that the step and the film hold, or trace paths of `step.batch` again in the tables of the scene
-        that it is compared with; `Film.first_plane` tells where the planes of its own passes begin. By
-        default each pass gets its planes of the path buffer."""
+    def render(self, step: Step, film: Film) -> int:
+        """Job 3: trace a step, and put what it brings into the film; returns how many paths it traced in the
+        scene that this one is compared with. It may launch kernels of its own over all that the step and the
+        film hold, or trace paths of `step.batch` again in the tables of that other scene; `Film.first_plane`
+        tells where the planes of its own passes begin. By default each pass gets its planes of the path
+        buffer."""
         step.tracer.trace(step.batch)
         film.reduce(step.batch.params, step.plan, step.batch.slots, step.batch.path_buffer)
+        return 0
 
     def image(self, film: Film, comparison: Comparison | None) -> Float32Array:
         """Job 3: (height, width, 4) the picture that the film shows: mean radiance, linear, and 1 where there

@@ -195,7 +195,7 @@ def _edit_session(
                 began = time.perf_counter()
                 report = session.step()
                 seconds += time.perf_counter() - began
-                paths += report.paths
+                paths += report.paths + report.partners
                 on_step(f"{timed.edit.label}: {variant.label}", report)
             if step in timed.captures:
                 image = session.image()

@@ -107,11 +107,11 @@ class Probe(Strategy):
         count = situation.film.sums()["traces"][1]
         return 1 + order % 3 + int(count.max())
 
-    def render(self, step: Step, film: Film) -> None:
+    def render(self, step: Step, film: Film) -> int:
         stride = int(step.batch.params["buffer_stride"])
         place = 4 * film.first_plane("traces") * stride
         film.device.write(step.batch.path_buffer, np.full(stride, 2.0, np.float32), offset=place)
-        super().render(step, film)
+        return super().render(step, film)
 
 
 @pytest.mark.parametrize("aovs", [False, True])

@@ -70,7 +70,7 @@ def state(view: View, *sides: Side, spent: tuple[float, ...] | None = None, now:
 def report_of(side: Side, tiles: list[int], done: int, paths: int = 64) -> StepReport:
     length = len(side.progress.queue.tiles)
     return StepReport(
-        side.progress.mode, np.array(tiles, np.int32), done, length, paths, 0.0, 0, is_shown=len(tiles) > 0
+        side.progress.mode, np.array(tiles, np.int32), done, length, paths, 0, 0.0, 0, is_shown=len(tiles) > 0
     )
 
 

@@ -101,18 +101,18 @@ class Impact(Strategy):
             worth,
         )
 
-    def render(self, step: Step, film: Film) -> None:
+    def render(self, step: Step, film: Film) -> int:
         """Trace a step, with the partners of its paths in the anchor."""
         comparison, batch = step.comparison, step.batch
         if comparison is None:
-            super().render(step, film)
-            return
+            return super().render(step, film)
         assert step.pairs is not None, "a comparison needs room for pairs"
-        PairTracer(step.tracer).trace(batch, comparison.anchor, comparison.changes, step.pairs)
+        partners = PairTracer(step.tracer).trace(batch, comparison.anchor, comparison.changes, step.pairs)
         reduce_pairs(film, batch, step.plan.slots, step.pairs)
         others = tuple(one for one in film.passes if one is not RADIANCE)
         if others:
             film.reduce(batch.params, step.plan, batch.slots, batch.path_buffer, others)
+        return partners
 
     def image(self, film: Film, comparison: Comparison | None) -> Float32Array:
         """The anchor's picture with what is found of the change."""

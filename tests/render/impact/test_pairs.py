@@ -325,6 +325,22 @@ def test_a_path_buffer_that_is_larger_than_the_pairs(device: Device) -> None:
         PairTracer(session._tracer).trace(batch, batch.tables, changes, buffers)
 
 
+def test_a_step_tells_how_many_partners_it_traced(device: Device) -> None:
+    """As many as the film has of touched samples: in the first round all of these have partners, and no path
+    lies beyond the edges of the picture."""
+    old = replace(mixed(), settings=replace(SMALL, size=(64, 32), strategy="impact"))
+    session = session_of(device, old, True)
+    session.render(2)
+    assert session.step().partners == 0
+    session.edit(EDITS[0].apply(old))
+    partners, report = 0, session.step(4)
+    while report.queue_done < report.queue_length:
+        partners += report.partners
+        report = session.step(4)
+    partners += report.partners
+    assert partners == session._state.film.sums()["pairs"][layout.PairPlane.TOUCHED].sum() > 0
+
+
 def test_kernels_of_pairs_are_built_ahead(
     in_blocks: bool, device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
