@@ -20,8 +20,12 @@ DIGEST_CHARACTERS = 16
 # Where something came from, and how a scene proposes to be rendered, is not what it looks like.
 _NOT_CONTENT = ("source", "settings")
 
-_MEASURED = ("core", "picture", "scene", "formats", "device", "accel", "tables", "render", "viewer")
+_MEASURED = (
+    "core", "picture", "scene", "formats", "device", "accel", "tables", "render", "render.impact", "viewer",
+)  # fmt: skip
 """Packages of incpt that a result may depend on; what only puts things on the terminal is left out."""
+_OF_STRATEGIES = ("impact/",)
+"""Folders of cl/ that only strategies use, and no converged picture."""
 
 _meshes: WeakKeyDictionary[Mesh, str] = WeakKeyDictionary()
 
@@ -83,8 +87,8 @@ def code_digest() -> str:
 
 @cache
 def kernel_digest() -> str:
-    """Of the kernels and the layout they share with the host: what decides how a picture looks."""
-    return digest(_kernels())
+    """Of the kernels that decide how a converged picture looks."""
+    return digest({path: text for path, text in _kernels().items() if not path.startswith(_OF_STRATEGIES)})
 
 
 def _kernels() -> dict[str, str]:

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.small_scenes import mixed_scene
 
-from incpt.benchmarks.kit import experiment, store
+from incpt.benchmarks.kit import content, experiment, store
 from incpt.benchmarks.kit.content import code_digest, digest
 from incpt.benchmarks.kit.experiment import Outcome, Task, Work, time_left
 from incpt.benchmarks.kit.store import Results, Store
@@ -59,6 +59,22 @@ def test_digest_is_that_of_what_json_keeps(value: Any) -> None:
 def test_code_digest_is_short_and_stable() -> None:
     assert code_digest() == code_digest()
     assert len(code_digest()) == 16
+
+
+def test_results_depend_on_all_code_that_renders() -> None:
+    incpt = Path(content.__file__).parents[2] / "incpt"
+    packages = {".".join(file.parent.relative_to(incpt).parts) for file in incpt.rglob("*.py")}
+    assert set(content._MEASURED) == packages - {"", "cli", "replay"}
+
+
+def test_converged_pictures_depend_on_kernels_that_trace_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def digest_with(path: str) -> str:
+        content.kernel_digest.cache_clear()
+        monkeypatch.setattr(content, "_kernels", lambda: {"path/shade": "a", "impact/pair": "b", path: "c"})
+        return content.kernel_digest()
+
+    assert digest_with("impact/pair") == digest_with("impact/other") != digest_with("path/shade")
+    content.kernel_digest.cache_clear()
 
 
 # --------------------------------------------------------------------------------------------- store
