@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from rich.table import Table
 
+from incpt.benchmarks.impact import tables as impact_tables
 from incpt.benchmarks.kit.store import Results, Row
 from incpt.benchmarks.measures import build, latency, rays, scale, steps, sweep, table51
 from incpt.benchmarks.peers import compare
@@ -34,6 +35,11 @@ EXPERIMENTS = {
         "Tile size, NoR, strategy, bounces",
         sweep.tables,
         ("scene", "size", "base_spp", "reference_spp"),
+    ),
+    impact_tables.NAME: Experiment(
+        "The strategy impact beside others",
+        impact_tables.tables,
+        ("reference", "size_scale", "tile_size", "seed"),
     ),
     compare.NAME: Experiment("Beside other renderers", compare.tables, ("size", "threads", "reference_spp")),
     rays.NAME: Experiment("Traversal beside Embree", lambda results: [rays.table(results)], ("size",)),

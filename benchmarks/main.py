@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import typer
 
 from incpt.benchmarks import report
+from incpt.benchmarks.impact import command
 from incpt.benchmarks.measures import build, latency, rays, scale, screenshots, soak, steps, sweep, table51
 from incpt.benchmarks.peers import compare
 from incpt.core.errors import InputError
@@ -22,6 +23,7 @@ app = typer.Typer(
 # A new command is a line here.
 app.command("sweep")(sweep.sweep)
 app.command("table51")(table51.table51)
+app.command("impact")(command.impact)
 app.command("rays")(rays.rays)
 app.command("peers")(compare.peers)
 app.command("build")(build.build)

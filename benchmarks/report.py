@@ -15,6 +15,7 @@ import typer
 from rich.table import Table
 
 from incpt.benchmarks.catalogue import EXPERIMENTS, setup_text
+from incpt.benchmarks.impact import tables as impact
 from incpt.benchmarks.kit import options, plots, store, tables
 from incpt.benchmarks.kit.fit import fitted
 from incpt.benchmarks.kit.store import Results, grouped
@@ -136,6 +137,16 @@ def _figures(folder: Path) -> Iterable[str]:
         yield f'<figure><img alt="{escape(picture.stem)}" src="data:image/png;base64,{encoded}"></figure>'
 
 
+def _impact(results: Results) -> Iterable[str]:
+    for measure, x_label in (
+        (impact.STEPS, "steps after the edit"),
+        (impact.SECONDS, "seconds after the edit"),
+    ):
+        for base, curves in impact.curves(results, measure).items():
+            title = f"mean over edits of a picture of {base:,} samples"
+            yield _figure(plots.lines(curves, x_label, "normalized RMSE, restart = 1", title))
+
+
 def _rays(results: Results) -> Iterable[str]:
     rates = grouped(results, lambda r: r.values.get("rays_per_second"), "scene", "rays", "tracer")
     for scene in dict.fromkeys(scene for scene, _, _ in rates):
@@ -193,6 +204,7 @@ _PLOTS: dict[str, Callable[[Results], Iterable[str]]] = {
     table51.NAME: _table51,
     sweep.NAME: _sweep,
     compare.NAME: _peers,
+    impact.NAME: _impact,
     rays.NAME: _rays,
     build.NAME: _build,
     scale.NAME: _scale,

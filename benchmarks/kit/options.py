@@ -57,6 +57,14 @@ def counts(option: str, given: Sequence[int] | None, default: Sequence[int], lea
     return sorted(set(given)) if given else list(default)
 
 
+def moments(option: str, given: Sequence[float] | None, default: Sequence[float]) -> tuple[float, ...]:
+    """Seconds in rising order, each once. Raises InputError for those that are no time."""
+    for number in given or ():
+        if not 0 < number < 1e6:
+            raise InputError(f"{option}: {number:g} is out of range; use a positive number of seconds")
+    return tuple(sorted(set(given))) if given else tuple(default)
+
+
 def optional(module: str, what: str, extra: str) -> ModuleType:
     """A module of an optional library. Raises InputError, which names the extra that brings it."""
     try:

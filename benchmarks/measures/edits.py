@@ -107,9 +107,13 @@ class EditBench:
         self._session: Session | None = None
         self._warm: set[tuple[Any, ...]] = set()
 
+    def kept(self, settings: RenderSettings, note: Note) -> FloatImage:
+        """The picture before the edit."""
+        return self.gallery.converged(self.scene, settings, self.base_spp, note)
+
     def start(self, settings: RenderSettings, note: Note) -> Snapshot:
         """A session's state after refining the scene before the edit."""
-        image = self.gallery.converged(self.scene, settings, self.base_spp, note)
+        image = self.kept(settings, note)
         grid = tiles.TileGrid(*settings.size, settings.tile_size)
         sums = np.empty((4, *image.shape[:2]), np.float32)
         sums[:3] = np.moveaxis(image, 2, 0) * np.float32(self.base_spp)
@@ -133,18 +137,19 @@ class EditBench:
         after = edit.apply(self.scene)
         start = self.start(settings, lambda f: note(0.2 * f))
         reference = self.reference(after, settings, lambda f: note(0.2 + 0.3 * f))
-        session = self._at(start)
+        session = self.at(start)
         variant = (settings, edit.label)
         if variant not in self._warm:
             # Kernels are specialised for sizes, and trees of new meshes built, at their first use.
             session.edit(after, pixel=edit.pixel)
             session.step()
             self._warm.add(variant)
-            session = self._at(start)
+            session = self.at(start)
         ready()
         return _timed(session, edit, after, reference, marks, note)
 
-    def _at(self, start: Snapshot) -> Session:
+    def at(self, start: Snapshot) -> Session:
+        """The session, which is the same for all edits, as it was at that state."""
         if self._session is None:
             self._session = Session(start.scene, settings=start.progress.settings, device=self.device)
         self._session.restore(start)

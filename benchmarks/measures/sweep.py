@@ -23,7 +23,7 @@ from incpt.benchmarks.kit.store import Results, Store, grouped
 from incpt.benchmarks.kit.tables import print_table
 from incpt.benchmarks.kit.timing import interleaved, summary
 from incpt.benchmarks.measures.edits import EditBench, Marks, Timeline, edit_subject
-from incpt.core.errors import InputError, in_place
+from incpt.core.errors import in_place
 from incpt.core.settings import STRATEGIES, RenderSettings
 from incpt.device.device import Device
 from incpt.formats import registry
@@ -276,7 +276,7 @@ def sweep(
         options.counts("--max-bounces", max_bounces, (scene.settings.max_bounces,), least=0),
         Marks(
             tuple(options.counts("--at-step", at_step, STEPS, least=0)),
-            _seconds(at_second, SECONDS[:3] if quick else SECONDS),
+            options.moments("--at-second", at_second, SECONDS[:3] if quick else SECONDS),
             done=True,
         ),
         repetitions or (1 if quick else 3),
@@ -291,10 +291,3 @@ def sweep(
     bench = EditBench(opened, gallery, scene, grid.base_spp, grid.reference_spp)
     found = experiment.run(store, tasks(bench, script, settings, grid), environment.describe(opened))
     print_table(tables(found), found, store)
-
-
-def _seconds(given: Sequence[float] | None, default: Sequence[float]) -> tuple[float, ...]:
-    for number in given or ():
-        if not 0 < number < 1e6:
-            raise InputError(f"--at-second: {number:g} is out of range; use a positive number of seconds")
-    return tuple(sorted(set(given))) if given else tuple(default)

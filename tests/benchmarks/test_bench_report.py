@@ -13,6 +13,7 @@ import pytest
 
 from incpt.benchmarks import quoted, report
 from incpt.benchmarks.catalogue import EXPERIMENTS
+from incpt.benchmarks.impact import tables as impact
 from incpt.benchmarks.kit import plots
 from incpt.benchmarks.kit.experiment import run
 from incpt.benchmarks.kit.fit import fitted
@@ -254,6 +255,9 @@ def test_report_of_every_experiment(tmp_path: Path) -> None:
     place = {"scene": "s", "edit": "turn & move", "tile_size": 16, "max_bounces": 2}
     add("sweep", {**place, "strategy": "spiral", "nor": 16}, times, marks)
     add("sweep", {**place, "strategy": "restart", "nor": None}, {**times, "queue_s": 1.5}, marks)
+    for variant in ("restart", "impact"):
+        cell = {"measure": "steps", "edit": "cbox", "variant": variant, "base": 64}
+        add("impact", cell, {}, [{"mark": "1 steps", **dict.fromkeys(impact.METRICS, 0.1)}])
     for tracer in rays.TRACERS:
         subject = {"scene": "s", "rays": "shadow", "tracer": tracer, "measure": "rate"}
         add("rays", subject, {"rays_per_second": 5e6})
@@ -270,8 +274,9 @@ def test_report_of_every_experiment(tmp_path: Path) -> None:
     text = report.page(tmp_path)
     page = parsed(text)
     assert page.headings == [name for name in EXPERIMENTS if name not in ("table51", "latency")]
-    # Errors by steps and by seconds; rays; rate, error and latency of renderers; trees; lamps; repetition.
-    assert text.count("<svg") == 2 + 1 + 3 + 1 + 1 + 1
+    # Errors by steps and by seconds; of impact; rays; rate, error and latency of renderers; trees; lamps;
+    # repetition.
+    assert text.count("<svg") == 2 + 1 + 1 + 3 + 1 + 1 + 1
     assert "turn &amp; move" in text and "<b>turn & move" not in text
     assert text.count("n^0.50") >= 2
     assert "<b>million rays per second</b>" in text
