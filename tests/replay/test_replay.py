@@ -199,8 +199,8 @@ def test_the_command_leaves_pictures_sheet_and_errors(
     folder = tmp_path / "new" / "out"
     assert main([*files, "-o", str(folder)]) == 0
     names = {path.name for path in folder.iterdir()}
-    turned = {f"1-turn-a-little-{v}-step00{s}.png" for v in ("restart", "spiral8") for s in (0, 2)}
-    shrunk = {f"2-cube-{v}-step001.png" for v in ("restart", "spiral8")}
+    turned = {f"1-turn-a-little-{v}-step00{s}.png" for v in ("restart", "spiral8", "impact") for s in (0, 2)}
+    shrunk = {f"2-cube-{v}-step001.png" for v in ("restart", "spiral8", "impact")}
     converged = {"base.png", "1-turn-a-little-converged.png", "2-cube-converged.png"}
     assert names == turned | shrunk | converged | {"errors.csv", "sheet.png"}
     assert all(PIL.Image.open(folder / name).size == (40, 32) for name in turned | shrunk | converged)
@@ -210,8 +210,11 @@ def test_the_command_leaves_pictures_sheet_and_errors(
         ("1", "restart", "2"),
         ("1", "spiral", "0"),
         ("1", "spiral", "2"),
+        ("1", "impact", "0"),
+        ("1", "impact", "2"),
         ("2", "restart", "1"),
         ("2", "spiral", "1"),
+        ("2", "impact", "1"),
     ]
     printed = capsys.readouterr().out
     for row in rows:
