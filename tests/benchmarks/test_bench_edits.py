@@ -225,7 +225,7 @@ def test_sweep_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture
 
     assert main.main(command) == 0  # nothing is left to do
     assert "6 of 6 measurements were there" in capsys.readouterr().err
-    assert len(read(tmp_path / "out" / "sweep.jsonl").records) == 4
+    assert len(read(tmp_path / "out" / "sweep.jsonl").records) == 6
 
 
 @pytest.mark.parametrize(
