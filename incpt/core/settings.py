@@ -28,7 +28,8 @@ class RenderSettings:
     nor                   repetitions of a tile while an edit is re-rendered (NoR of INCREMENTAL).
     base_nor              repetitions in BASE and REFINE.
     sample_rate           paths per pixel and slot.
-    strategy              "restart" (every edit starts over) or "spiral" (the thesis).
+    strategy              "restart" (every edit starts over), "spiral" (the thesis) or "impact" (what an edit
+                          changes is measured by pairs of paths; see incpt/render/impact/README.md).
     point_of_change       "bounds" (centre of the object's 2D bounding box, old and new place) or
                           "pixel" (the pixel given with the edit: the thesis's choice).
     slots_per_step        tiles that fit one step; None: as many as the image has (the thesis).

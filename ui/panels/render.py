@@ -21,9 +21,12 @@ MODE_TEXTS = {
     Mode.INCREMENTAL: "Incremental: what the edit affects first",
 }
 """What a mode is called where it is shown."""
-STRATEGY_TEXTS = {"restart": "Restart", "spiral": "Spiral"}
+STRATEGY_TEXTS = {"restart": "Restart", "spiral": "Spiral", "impact": "Impact"}
 """What a strategy is called where it is chosen; one that is not here is called by its name."""
-_STRATEGY_TIP = "Restart: an edit starts everything anew. Spiral: from the edit outwards, the rest is kept"
+_STRATEGY_TIP = (
+    "Restart: an edit starts everything anew. Spiral: from the edit outwards, the rest is kept. "
+    "Impact: what the edit changes is measured, and rendered where it is seen"
+)
 _TILE_SIZES = (8, 16, 32, 64, 128)
 """Tile sizes that are offered, in pixels."""
 
