@@ -12,11 +12,10 @@
 // (Rousselle et al. 2012 use two halves so); signal / (signal + noise) of each detail is shown.
 //
 //     split_change    the change in each half, and its weight
-//     smooth_change   the next coarser scale, and the detail that is lost on the way; after the last scale
-//     also
-//                     what is left, as a detail of its own
-//     judge_details   the share that is shown of the details of each cell, class and scale
-//     show_change     the picture
+//     smooth_change   the next coarser scale, and the detail that is lost on the way; after the last one
+//                     also what is left, as a detail of its own
+//     pool_evidence   what cells and those around tell of details
+//     show_change     the picture, with a share of each detail
 //
 // Patches without a change nearby are left out. What the sums hold is never smoothed.
 
@@ -25,7 +24,6 @@
 // Of a variance: what is lost in rounding.
 #define ROUNDING 1e-7f
 
-// Shares of details are interpolated between cells like rules.
 INLINE Rule rule_between(__global const float *column_rules, size_t size, const CellRows *rows, size_t x,
                          const ClassShares *class) {
     const Rule r = {between_cells(column_rules + RULE_OLD_WEIGHT * CLASSES * size, size, rows, x, class),
@@ -168,30 +166,31 @@ INLINE Detail detail_of(Vec3 first, Vec3 second, float first_weight, float secon
     return detail;
 }
 
-#define ADD_EVIDENCE(detail, class, first_plane)                                                             \
-    COLUMN(columns, first_plane + EVIDENCE_SIGNAL, x, patch) += class.first * detail.signal;                 \
-    COLUMN(columns, first_plane + EVIDENCE_NOISE, x, patch) += class.first * detail.noise;                   \
-    COLUMN(columns, first_plane + EVIDENCE_PLANES + EVIDENCE_SIGNAL, x, patch) +=                            \
-        class.second * detail.signal;                                                                        \
-    COLUMN(columns, first_plane + EVIDENCE_PLANES + EVIDENCE_NOISE, x, patch) += class.second * detail.noise
+// Sums over a cell for a detail: of each Evidence for each class.
+#define CELL_EVIDENCE (EVIDENCE_PLANES * CLASSES)
+// Stores a detail, and what it tells in the columns of its cell.
+#define STORE_DETAIL(detail, shown_mean, number)                                                             \
+    store_vec3(details + 3u * (scale_index + number) * pixels, pixels, pixel, shown_mean);                   \
+    COLUMN(columns, CELL_EVIDENCE *number, x, patch) += class.first * detail.signal;                         \
+    COLUMN(columns, CELL_EVIDENCE *number + 1u, x, patch) += class.second * detail.signal;                   \
+    COLUMN(columns, CELL_EVIDENCE *number + 2u, x, patch) += class.first * detail.noise;                     \
+    COLUMN(columns, CELL_EVIDENCE *number + 3u, x, patch) += class.second * detail.noise
 
-// `details` has three planes for each scale, and for the rest; `evidence` has Evidence for each class of
-// these.
+// `details` has three planes for each scale, and for the rest; `evidence` has Evidence for each local scale.
 __kernel WIDE void smooth_change(PICTURE_PARAMETERS, LABELS_PARAMETERS, GUIDES_PARAMETERS, SPANS_PARAMETERS,
                                  SCALE_PARAMETERS, HALVES_PARAMETERS, SMOOTH_HALVES_PARAMETERS,
-                                 DETAILS_PARAMETERS, EVIDENCE_PARAMETERS) {
+                                 DETAILS_PARAMETERS, EVIDENCE_PARAMETERS, CELL_EVIDENCE_PARAMETERS) {
 #ifdef LAST_SCALE
-    CELL_COLUMNS(columns, 2u * CLASSES * EVIDENCE_PLANES);
-    const uint sums = 2u * CLASSES * EVIDENCE_PLANES;
+    CELL_COLUMNS(columns, 2u * CELL_EVIDENCE);
+    const uint sums = 2u * CELL_EVIDENCE;
 #else
-    CELL_COLUMNS(columns, CLASSES * EVIDENCE_PLANES);
-    const uint sums = CLASSES * EVIDENCE_PLANES;
+    CELL_COLUMNS(columns, CELL_EVIDENCE);
+    const uint sums = CELL_EVIDENCE;
 #endif
     const Patch patch = patch_of(width, height, CELL_SIZE);
     const size_t pixels = (size_t)width * height, size = field_size(width, height);
     const size_t step = 1u << scale_index, below = step * field_pitch(width);
     __global const uint *guide = guides + 2u * scale_index * size;
-    __global float *detail_of_scale = details + 3u * scale_index * pixels;
     const Patch near = near_change(&patch, height, spans);
     EACH_ROW(y, near)
     EACH_COLUMN(x, near) {
@@ -215,72 +214,91 @@ __kernel WIDE void smooth_change(PICTURE_PARAMETERS, LABELS_PARAMETERS, GUIDES_P
                       fine_first_weight, fine_second_weight);
         // In the finest detail one half alone tells nothing of its noise.
         const int shows = (scale_index > 0u) | ((fine_first_weight > 0.0f) & (fine_second_weight > 0.0f));
-        store_vec3(detail_of_scale, pixels, pixel, select(shows, detail.mean, none));
-        ADD_EVIDENCE(detail, class, 0u);
+        const Vec3 shown_mean = select(shows, detail.mean, none);
+        STORE_DETAIL(detail, shown_mean, 0u);
 #ifdef LAST_SCALE
         const Detail rest = detail_of(first, second, first_weight, second_weight);
-        store_vec3(detail_of_scale + 3u * pixels, pixels, pixel, rest.mean);
-        ADD_EVIDENCE(rest, class, CLASSES * EVIDENCE_PLANES);
+        STORE_DETAIL(rest, rest.mean, 1u);
 #else
+        evidence[(EVIDENCE_PLANES * scale_index + EVIDENCE_SIGNAL) * size + place] = detail.signal;
+        evidence[(EVIDENCE_PLANES * scale_index + EVIDENCE_NOISE) * size + place] = detail.noise;
         store_vec3(smooth_halves + HALF_CHANGE_R_0 * size, size, place, first);
         store_vec3(smooth_halves + HALF_CHANGE_R_1 * size, size, place, second);
         smooth_halves[HALF_WEIGHT_0 * size + place] = first_weight;
         smooth_halves[HALF_WEIGHT_1 * size + place] = second_weight;
 #endif
     }
-    __global float *cells_of_scale =
-        evidence + scale_index * CLASSES * EVIDENCE_PLANES * cell_count(width, height);
-    store_cell_sums(columns, sums, &patch, width, height, cells_of_scale);
+    const size_t first_sum = (size_t)scale_index * CELL_EVIDENCE * cell_count(width, height);
+    store_cell_sums(columns, sums, &patch, width, height, cell_evidence + first_sum);
 }
 
-// Goes over each class of each row of cells, for each scale and for the rest. Evidence is summed up over
-// neighbouring cells, those at the sides half and those at the corners a quarter.
-__kernel WIDE void judge_details(PICTURE_PARAMETERS, EVIDENCE_PARAMETERS, SHARES_PARAMETERS) {
-    const int columns = cell_columns(width), rows = MAX(cell_rows(height), 1u), total = columns * rows;
-    const Patch patch = patch_of(columns, (SMOOTHING_SCALES + 1u) * CLASSES * cell_rows(height), 1u);
+// Means over cells and those around, of which those at the sides count half and those at the corners a
+// quarter.
+__kernel WIDE void pool_evidence(PICTURE_PARAMETERS, CELL_EVIDENCE_PARAMETERS, POOLED_EVIDENCE_PARAMETERS) {
+    const int columns = cell_columns(width), rows = MAX(cell_rows(height), 1u);
+    const Patch patch = patch_of(columns, (SMOOTHING_SCALES + 1u) * CELL_EVIDENCE * cell_rows(height), 1u);
     EACH_ROW(y, patch) {
-        const int plane = (int)y / rows, row = (int)y % rows;
-        __global const float *middle = evidence + plane * EVIDENCE_PLANES * total + row * columns;
+        const int row = (int)y % rows;
+        __global const float *middle = cell_evidence + y * columns;
         const float has_upper = row > 0 ? 0.5f : 0.0f, has_lower = row < rows - 1 ? 0.5f : 0.0f;
         __global const float *upper = middle - (row > 0 ? columns : 0);
         __global const float *lower = middle + (row < rows - 1 ? columns : 0);
         EACH_COLUMN(x, patch) {
-            float sums[EVIDENCE_PLANES];
-#pragma unroll
-            for (size_t i = 0u; i < EVIDENCE_PLANES; i++) {
-                const size_t at = i * total + x;
 #define THREE_ROWS(at) (middle[at] + (has_upper * upper[at] + has_lower * lower[at]))
-                const float left = x > 0u ? THREE_ROWS(at - 1u) : 0.0f;
-                const float right = x + 1u < (size_t)columns ? THREE_ROWS(at + 1u) : 0.0f;
-                sums[i] = THREE_ROWS(at) + 0.5f * (left + right);
+            const float left = x > 0u ? THREE_ROWS(x - 1u) : 0.0f;
+            const float right = x + 1u < (size_t)columns ? THREE_ROWS(x + 1u) : 0.0f;
+            const float sum = THREE_ROWS(x) + 0.5f * (left + right);
 #undef THREE_ROWS
-            }
-            const float signal = MAX(sums[EVIDENCE_SIGNAL], 0.0f);
-            shares[y * columns + x] = signal > 0.0f ? signal / (signal + sums[EVIDENCE_NOISE]) : 0.0f;
+            pooled_evidence[y * columns + x] = sum * (1.0f / (4u * CELL_SIZE * CELL_SIZE));
         }
     }
 }
 
-__kernel WIDE void show_change(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PARAMETERS, SPANS_PARAMETERS,
-                               BASE_PARAMETERS, DETAILS_PARAMETERS, COLUMN_SHARES_PARAMETERS,
-                               SHOWN_IMAGE_PARAMETERS) {
+// What cells tell of a detail counts for so many samples of a pixel, beside what it tells itself and its
+// neighbours at the distance of the detail. So the first samples are judged together, and many where they
+// are.
+#define CELLS_COUNT 32.0f
+
+// The share of a detail that is no noise.
+INLINE float signal_share(float signal, float noise) {
+    return signal > 0.0f ? signal / (signal + noise) : 0.0f;
+}
+
+__kernel WIDE void show_change(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PARAMETERS, GUIDES_PARAMETERS,
+                               SPANS_PARAMETERS, BASE_PARAMETERS, DETAILS_PARAMETERS, EVIDENCE_PARAMETERS,
+                               COLUMN_EVIDENCE_PARAMETERS, SHOWN_IMAGE_PARAMETERS) {
     const Patch patch = patch_of(width, height, CELL_SIZE);
     const Patch near = near_change(&patch, height, spans);
-    const size_t pixels = (size_t)width * height, size = (size_t)width * cell_rows(height);
+    const size_t pixels = (size_t)width * height, size = field_size(width, height);
+    const size_t column_size = (size_t)width * cell_rows(height);
     EACH_ROW(y, near) {
         const CellRows rows = cell_rows_around(width, height, y);
         EACH_COLUMN(x, near) {
-            const size_t pixel = y * width + x;
+            const size_t pixel = y * width + x, place = field_place(width, x, y);
             const ClassShares class = class_shares(labels[pixel]);
+            const float samples =
+                pairs[PAIR_SAMPLES_0 * pixels + pixel] + pairs[PAIR_SAMPLES_1 * pixels + pixel];
+            const float cells_count = CELLS_COUNT / MAX(samples, 1.0f);
             Vec3 light = load_vec3(base_light, pixels, pixel);
 #pragma unroll
             for (size_t i = 0u; i <= SMOOTHING_SCALES; i++) {
-                const float share = between_cells(column_shares + i * CLASSES * size, size, &rows, x, &class);
-                light = add(light, scale(share, load_vec3(details + 3u * i * pixels, pixels, pixel)));
+                __global const float *of_cells = column_evidence + CELL_EVIDENCE * i * column_size;
+                float signal = between_cells(of_cells, column_size, &rows, x, &class);
+                float noise = between_cells(of_cells + CLASSES * column_size, column_size, &rows, x, &class);
+                if (i < LOCAL_SCALES) {
+                    const size_t step = (size_t)1u << i, below = step * field_pitch(width);
+                    __global const float *field = evidence + EVIDENCE_PLANES * i * size;
+                    float weights[9];
+                    load_guides(guides + 2u * i * size, size, place, weights);
+                    const Around signals = load_around(field + EVIDENCE_SIGNAL * size, place, step, below);
+                    const Around noises = load_around(field + EVIDENCE_NOISE * size, place, step, below);
+                    signal = weighted(&signals, weights) + cells_count * signal;
+                    noise = weighted(&noises, weights) + cells_count * noise;
+                }
+                const Vec3 detail = load_vec3(details + 3u * i * pixels, pixels, pixel);
+                light = add(light, scale(signal_share(signal, noise), detail));
             }
-            const float samples = anchor_sums[3u * pixels + pixel] + pairs[PAIR_SAMPLES_0 * pixels + pixel] +
-                                  pairs[PAIR_SAMPLES_1 * pixels + pixel];
-            store_pixel(shown_image, pixel, light, samples > 0.0f);
+            store_pixel(shown_image, pixel, light, anchor_sums[3u * pixels + pixel] + samples > 0.0f);
         }
     }
 }

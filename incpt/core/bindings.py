@@ -335,11 +335,21 @@ SMOOTH_HALVES = Group("SMOOTH_HALVES", None, (_planes("smooth_halves", "HalfPlan
 
 DETAILS = Group("DETAILS", None, (_planes("details", "three planes for each scale and for the rest"),))
 
-EVIDENCE = Group("EVIDENCE", None, (_planes("evidence", "Evidence for each class of each detail"),))
+EVIDENCE = Group("EVIDENCE", None, (_planes("evidence", "Evidence for each of LOCAL_SCALES, with a margin"),))
 
-SHARES = Group("SHARES", None, (_planes("shares", "what is shown of the details, for each class"),))
+CELL_EVIDENCE = Group(
+    "CELL_EVIDENCE",
+    None,
+    (_planes("cell_evidence", "sums of Evidence for each detail, each for each class"),),
+)
 
-COLUMN_SHARES = Group("COLUMN_SHARES", None, (_table("column_shares", "float", "`shares`, interpolated"),))
+POOLED_EVIDENCE = Group(
+    "POOLED_EVIDENCE", None, (_planes("pooled_evidence", "means over cells and those around"),)
+)
+
+COLUMN_EVIDENCE = Group(
+    "COLUMN_EVIDENCE", None, (_table("column_evidence", "float", "`pooled_evidence`, interpolated"),)
+)
 
 BASE = Group("BASE", None, (_planes("base_light", "three planes: the picture without its change"),))
 
@@ -450,7 +460,8 @@ GROUPS = (
     LAUNCH, SLOTS, PLACES, LIST, GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE, PATH_STATE, COMPACTION,
     BLOCK_MEMORY, RADIANCE, CHANGES, PARTNERS, FIRST_HITS, TRACED, REDUCTION, RESOLUTION, PICTURE, PAIRS,
     OLD_VALUES, LABELS, NORMALS, GUIDES, TILE_COLUMNS, COLUMN_SUMS, CELL_SUMS, CELLS, RULES, COLUMN_RULES,
-    SPREADING, SPANS, SLOPES, SCALE, HALVES, SMOOTH_HALVES, DETAILS, EVIDENCE, SHARES, COLUMN_SHARES, BASE,
+    SPREADING, SPANS, SLOPES, SCALE, HALVES, SMOOTH_HALVES, DETAILS, EVIDENCE, CELL_EVIDENCE,
+    POOLED_EVIDENCE, COLUMN_EVIDENCE, BASE,
     SHOWN_IMAGE,
     ITEMS, MESH, BOXES, CHUNKS, MEASURES, BINS, SIDES, MOVED, LEVEL, SPLITTING, LINKING, LEAVES, REFITTING,
 )  # fmt: skip
@@ -487,9 +498,13 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     "tile_columns": (PICTURE, PAIRS, LABELS, CELLS, RULES, SLOPES, TILE_COLUMNS),
     "sum_columns": (COLUMN_SUMS,),
     "split_change": (PICTURE, PAIRS, LABELS, CELLS, SPANS, COLUMN_RULES, HALVES, BASE, SHOWN_IMAGE),
-    "smooth_change": (PICTURE, LABELS, GUIDES, SPANS, SCALE, HALVES, SMOOTH_HALVES, DETAILS, EVIDENCE),
-    "judge_details": (PICTURE, EVIDENCE, SHARES),
-    "show_change": (PICTURE, PAIRS, LABELS, SPANS, BASE, DETAILS, COLUMN_SHARES, SHOWN_IMAGE),
+    "smooth_change": (
+        *(PICTURE, LABELS, GUIDES, SPANS, SCALE, HALVES, SMOOTH_HALVES, DETAILS, EVIDENCE, CELL_EVIDENCE),
+    ),
+    "pool_evidence": (PICTURE, CELL_EVIDENCE, POOLED_EVIDENCE),
+    "show_change": (
+        *(PICTURE, PAIRS, LABELS, GUIDES, SPANS, BASE, DETAILS, EVIDENCE, COLUMN_EVIDENCE, SHOWN_IMAGE),
+    ),
     "fold_change": (PICTURE, PAIRS, LABELS, CELLS, SHOWN_IMAGE),
     "bound_faces": (ITEMS, MESH, BOXES),
     "measure_chunks": (ITEMS, BOXES, CHUNKS, MEASURES),
@@ -514,7 +529,7 @@ FILES = {
     "find_spans": "cell_statistics",
     "split_change": "shrinkage",
     "smooth_change": "shrinkage",
-    "judge_details": "shrinkage",
+    "pool_evidence": "shrinkage",
     "show_change": "shrinkage",
     "bound_faces": "build_bvh",
     "measure_chunks": "build_bvh",

@@ -230,6 +230,8 @@ CLASSES = 2
 """Of pixels: those that show an object which changed itself, and all others, which come first."""
 SMOOTHING_SCALES = 4
 """Passes that take a change apart; that of scale k looks 2^k pixels around."""
+LOCAL_SCALES = 3
+"""Scales whose details are told from noise by the neighbours of a pixel too, and not by cells alone."""
 FIELD_MARGIN = 8
 """Pixels around the picture in the planes that are smoothed: the longest distance that passes look around."""
 GUIDE_UNIT = 765

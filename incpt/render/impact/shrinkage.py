@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import pyopencl as cl
 
 from incpt.core import layout
 from incpt.device.device import BUILD_SIZES, Device
@@ -22,7 +23,7 @@ from incpt.render.impact.sums import PAIR_SUMS
 
 _FILE = "shrinkage"
 _DETAILS = layout.SMOOTHING_SCALES + 1
-_SHARES = layout.CLASSES * _DETAILS
+_CELL_EVIDENCE = layout.CLASSES * len(layout.Evidence) * _DETAILS
 
 
 class Shrinkage:
@@ -33,17 +34,14 @@ class Shrinkage:
         pixels = width * height
         self.image_buffer = device.empty(16 * pixels)
         """The picture as of the last `update`: red, green, blue and 1, or 0 where there is no sample."""
-        field_bytes = 4 * len(layout.HalfPlane) * patches.field_size
-        self._halves = device.empty(field_bytes), device.empty(field_bytes)
-        for field in self._halves:
-            # Margins are read and never written.
-            device.fill(field, 0, field_bytes)
+        self._halves = tuple(self._field(len(layout.HalfPlane)) for _ in range(2))
         self._planes = {
             "details": device.empty(4 * 3 * _DETAILS * pixels),
             "base_light": device.empty(4 * 3 * pixels),
-            "evidence": device.empty(4 * _SHARES * len(layout.Evidence) * patches.cells),
-            "shares": device.empty(4 * _SHARES * patches.cells),
-            "column_shares": device.empty(4 * _SHARES * width * patches.cell_rows),
+            "evidence": self._field(layout.LOCAL_SCALES * len(layout.Evidence)),
+            "cell_evidence": device.empty(4 * _CELL_EVIDENCE * patches.cells),
+            "pooled_evidence": device.empty(4 * _CELL_EVIDENCE * patches.cells),
+            "column_evidence": device.empty(4 * _CELL_EVIDENCE * width * patches.cell_rows),
         }
 
     def update(self, film: Film, guides: Guides, statistics: Statistics) -> None:
@@ -72,6 +70,13 @@ class Shrinkage:
             ]
         return launches
 
+    def _field(self, planes: int) -> cl.Buffer:
+        """So many planes with margins, which are read and never written."""
+        nbytes = 4 * planes * self.patches.field_size
+        field = self.patches.device.empty(nbytes)
+        self.patches.device.fill(field, 0, nbytes)
+        return field
+
     def _values(self, film: Film, guides: Guides, statistics: Statistics) -> dict[str, Any]:
         return {
             **self._planes,
@@ -93,6 +98,7 @@ class Shrinkage:
             features = ("LAST_SCALE",) if scale == layout.SMOOTHING_SCALES - 1 else ()
             patches.launch("smooth_change", _FILE, own, features=features, least=least)
             fine, coarse = coarse, fine
-        patches.launch_cells("judge_details", _FILE, values, _SHARES, least)
-        spread_cells(patches, _SHARES, values["shares"], values["column_shares"], least)
+        patches.launch_cells("pool_evidence", _FILE, values, _CELL_EVIDENCE, least)
+        pooled, columns = values["pooled_evidence"], values["column_evidence"]
+        spread_cells(patches, _CELL_EVIDENCE, pooled, columns, least)
         patches.launch("show_change", _FILE, values, least=least)

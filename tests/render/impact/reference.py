@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core.layout import CELL_SIZE, GUIDE_UNIT, SMOOTHING_SCALES, PairPlane
+from incpt.core.layout import CELL_SIZE, GUIDE_UNIT, LOCAL_SCALES, SMOOTHING_SCALES, PairPlane
 
 Array = npt.NDArray[np.float64]
 HALVES = 2
@@ -340,34 +340,37 @@ def shrunk(change: Array, samples: Array, variance: Array, guides: Guides) -> Ar
         else:
             details, coarse, coarse_weights = change, change, weights
         details = np.where((weights > 0)[..., None], details, 0)
-        total += shown_of_detail(details, weights, scale, guides.changed)
+        total += shown_of_detail(details, weights, samples.sum(0), scale, guides)
         change, weights = coarse, coarse_weights
     return total
 
 
-def shown_of_detail(details: Array, weights: Array, scale: int, changed: npt.NDArray[np.bool_]) -> Array:
+def shown_of_detail(details: Array, weights: Array, samples: Array, scale: int, guides: Guides) -> Array:
     both, weight = (weights > 0).all(0), weights.sum(0)
     parts = weights / np.maximum(weight, 1e-300)
     mean = (parts[..., None] * details).sum(0)
     count = np.where(both, np.sqrt(weight), 0)
     signal = count * (details[0] * details[1]).mean(-1)
     noise = count * ((details[0] - details[1]) ** 2).mean(-1) * parts[0] * parts[1]
-    shares = []
-    for class_of_pixels in (False, True):
-        here = changed == class_of_pixels
-        strength, noisy = (tent(cell_sums(values * here)) for values in (signal, noise))
-        strength = np.maximum(strength, 0)
-        shares.append(np.where(strength > 0, strength / np.maximum(strength + noisy, 1e-300), 0))
-    share = to_pixels(shares, changed)
+    of_cells = [
+        to_pixels([tent(cell_sums(values * (guides.changed == c))) for c in (False, True)], guides.changed)
+        for values in (signal, noise)
+    ]
+    strength, noisy = np.stack(of_cells)
+    if scale < LOCAL_SCALES:
+        around = guides.smoothed(np.stack([signal, noise], -1), scale)
+        strength, noisy = np.moveaxis(around, -1, 0) + 32 / np.maximum(samples, 1) * np.stack(of_cells)
+    strength = np.maximum(strength, 0)
+    share = np.where(strength > 0, strength / np.maximum(strength + noisy, 1e-300), 0)
     return np.where(both if scale == 0 else weight > 0, share, 0)[..., None] * mean
 
 
 def tent(cells: Array) -> Array:
-    """Sums with neighbouring cells, those at the sides half and those at the corners a quarter."""
+    """Means over the pixels of cells and those around, half of the sides and a quarter of the corners."""
     padded = np.pad(cells, 1)
     rows, columns = cells.shape
     parts = [(i, j, (2 - abs(i - 1)) * (2 - abs(j - 1)) / 4) for i in range(3) for j in range(3)]
-    return sum(part * padded[i : i + rows, j : j + columns] for i, j, part in parts)
+    return sum(p * padded[i : i + rows, j : j + columns] for i, j, p in parts) / (4 * CELL_SIZE**2)
 
 
 def worth(state: State, about: list[Known], changed: npt.NDArray[np.bool_]) -> Array:
