@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core import layout
-from incpt.device.device import BUILD_SIZES, Device
+from incpt.device.device import Device
 from incpt.render.impact.patches import Patches
 
 _CLASS_BIT = np.uint32(1 << 31)
@@ -49,8 +49,8 @@ class Guides:
 
     def idle_launches(self) -> list[Callable[[], None]]:
         """The launches of the kernel, with nothing to do; see `Device.built`."""
-        return [partial(self._weigh, self.patches.nothing, size) for size in BUILD_SIZES]
+        return [partial(self._weigh, self.patches.nothing)]
 
-    def _weigh(self, patches: Patches, least: int = 1) -> None:
+    def _weigh(self, patches: Patches) -> None:
         values = {"labels": self.labels, "guide_normals": self._normals, "guides": self.weights}
-        patches.launch("weigh_guides", "weigh_guides", values, least=least)
+        patches.launch("weigh_guides", "weigh_guides", values)

@@ -54,7 +54,8 @@ class Patches:
 
     @property
     def nothing(self) -> Patches:
-        """A picture without pixels, for launches that only build a kernel."""
+        """A picture without pixels, for launches that only build a kernel, of a patch each. PoCL builds
+        kernels once for small grids and once for large ones, but the patches of a picture are a small one."""
         return Patches(self.device, 1, 0)
 
     def launch(
@@ -64,24 +65,19 @@ class Patches:
         values: Mapping[str, Any],
         rows: int = layout.CELL_SIZE,
         features: tuple[str, ...] = (),
-        least: int = 1,
     ) -> None:
-        """Launch a kernel of cl/`file`.cl over all patches, of `rows` rows of pixels each; `least` of them at
-        least."""
-        self._launch_patches(
-            name, file, values, self._across(self.width) * -(-self.height // rows), features, least
-        )
+        """Launch a kernel of cl/`file`.cl over all patches, of `rows` rows of pixels each."""
+        patches = self._across(self.width) * -(-self.height // rows)
+        self._launch_patches(name, file, values, patches, features)
 
-    def launch_rows(self, name: str, file: str, values: Mapping[str, Any], rows: int, least: int = 1) -> None:
+    def launch_rows(self, name: str, file: str, values: Mapping[str, Any], rows: int) -> None:
         """Launch a kernel over patches one row high, of so many rows as long as those of the picture."""
-        self._launch_patches(name, file, values, self._across(self.width) * rows, (), least)
+        self._launch_patches(name, file, values, self._across(self.width) * rows, ())
 
-    def launch_cells(
-        self, name: str, file: str, values: Mapping[str, Any], planes: int, least: int = 1
-    ) -> None:
+    def launch_cells(self, name: str, file: str, values: Mapping[str, Any], planes: int) -> None:
         """Launch a kernel over patches of the cells of so many planes, one row high."""
         patches = self._across(self.cell_columns) * planes * self.cell_rows
-        self._launch_patches(name, file, values, patches, (), least)
+        self._launch_patches(name, file, values, patches, ())
 
     def launch_items(self, name: str, file: str, values: Mapping[str, Any], items: int) -> None:
         """Launch a kernel over so many work-items."""
@@ -97,10 +93,9 @@ class Patches:
         values: Mapping[str, Any],
         patches: int,
         features: tuple[str, ...],
-        least: int,
     ) -> None:
         group = 1 if self.device.is_clang_cpu else layout.PATCH_WIDTH
-        self._launch(name, file, values, max(patches, least) * group, group, features)
+        self._launch(name, file, values, max(patches, 1) * group, group, features)
 
     def _launch(
         self,

@@ -14,7 +14,7 @@ import numpy as np
 import pyopencl as cl
 
 from incpt.core import layout
-from incpt.device.device import BUILD_SIZES, Device
+from incpt.device.device import Device
 from incpt.render.film import Film, Float32Array
 from incpt.render.impact.guides import Guides
 from incpt.render.impact.patches import Patches
@@ -32,16 +32,16 @@ class Shrinkage:
     def __init__(self, device: Device, width: int, height: int) -> None:
         self.patches = patches = Patches(device, width, height)
         pixels = width * height
-        self.image_buffer = device.empty(16 * pixels)
+        self.image_buffer = self._touched(16 * pixels)
         """The picture as of the last `update`: red, green, blue and 1, or 0 where there is no sample."""
         self._halves = tuple(self._field(len(layout.HalfPlane)) for _ in range(2))
         self._planes = {
-            "details": device.empty(4 * 3 * _DETAILS * pixels),
-            "base_light": device.empty(4 * 3 * pixels),
+            "details": self._touched(4 * 3 * _DETAILS * pixels),
+            "base_light": self._touched(4 * 3 * pixels),
             "evidence": self._field(layout.LOCAL_SCALES * len(layout.Evidence)),
             "cell_evidence": device.empty(4 * _CELL_EVIDENCE * patches.cells),
             "pooled_evidence": device.empty(4 * _CELL_EVIDENCE * patches.cells),
-            "column_evidence": device.empty(4 * _CELL_EVIDENCE * width * patches.cell_rows),
+            "column_evidence": self._touched(4 * _CELL_EVIDENCE * width * patches.cell_rows),
         }
 
     def update(self, film: Film, guides: Guides, statistics: Statistics) -> None:
@@ -62,20 +62,21 @@ class Shrinkage:
     def idle_launches(self, film: Film, guides: Guides, statistics: Statistics) -> list[Callable[[], None]]:
         """The launches of all kernels, with nothing to do; see `Device.built`."""
         values, nothing = self._values(film, guides, statistics), self.patches.nothing
-        launches: list[Callable[[], None]] = []
-        for size in BUILD_SIZES:
-            launches += [
-                partial(self._run, nothing, values, size),
-                partial(nothing.launch, "fold_change", "fold_change", values, least=size),
-            ]
-        return launches
+        return [
+            partial(self._run, nothing, values),
+            partial(nothing.launch, "fold_change", "fold_change", values),
+        ]
 
     def _field(self, planes: int) -> cl.Buffer:
         """So many planes with margins, which are read and never written."""
-        nbytes = 4 * planes * self.patches.field_size
-        field = self.patches.device.empty(nbytes)
-        self.patches.device.fill(field, 0, nbytes)
-        return field
+        return self._touched(4 * planes * self.patches.field_size)
+
+    def _touched(self, nbytes: int) -> cl.Buffer:
+        """Memory of zeros: what a system gives out at the first write would cost the first picture several
+        times the time of others."""
+        buffer = self.patches.device.empty(nbytes)
+        self.patches.device.fill(buffer, 0, nbytes)
+        return buffer
 
     def _values(self, film: Film, guides: Guides, statistics: Statistics) -> dict[str, Any]:
         return {
@@ -90,15 +91,15 @@ class Shrinkage:
             "shown_image": self.image_buffer,
         }
 
-    def _run(self, patches: Patches, values: Mapping[str, Any], least: int = 1) -> None:
+    def _run(self, patches: Patches, values: Mapping[str, Any]) -> None:
         fine, coarse = self._halves
-        patches.launch("split_change", _FILE, {**values, "halves": fine}, least=least)
+        patches.launch("split_change", _FILE, {**values, "halves": fine})
         for scale in range(layout.SMOOTHING_SCALES):
             own = {**values, "scale_index": scale, "halves": fine, "smooth_halves": coarse}
             features = ("LAST_SCALE",) if scale == layout.SMOOTHING_SCALES - 1 else ()
-            patches.launch("smooth_change", _FILE, own, features=features, least=least)
+            patches.launch("smooth_change", _FILE, own, features=features)
             fine, coarse = coarse, fine
-        patches.launch_cells("pool_evidence", _FILE, values, _CELL_EVIDENCE, least)
+        patches.launch_cells("pool_evidence", _FILE, values, _CELL_EVIDENCE)
         pooled, columns = values["pooled_evidence"], values["column_evidence"]
-        spread_cells(patches, _CELL_EVIDENCE, pooled, columns, least)
-        patches.launch("show_change", _FILE, values, least=least)
+        spread_cells(patches, _CELL_EVIDENCE, pooled, columns)
+        patches.launch("show_change", _FILE, values)

@@ -70,13 +70,14 @@ class Statistics:
         """The launches of all kernels, with nothing to do; see `Device.built`."""
         values, nothing = self._values(film, guides) | {"columns": self._cell_sums}, self.patches.nothing
         grid = TileGrid(1, 0, 1)
-        launches: list[Callable[[], None]] = []
-        for size in BUILD_SIZES:
-            launches += [
-                partial(self._pool, nothing, values, size),
-                partial(self._sum_columns, nothing, grid, values, self._cell_sums, size),
-            ]
-        return launches
+        # Sums of tiles may be so many that PoCL's grid is a large one.
+        return [
+            partial(self._pool, nothing, values),
+            *(
+                partial(self._sum_columns, nothing, grid, values, self._cell_sums, size)
+                for size in BUILD_SIZES
+            ),
+        ]
 
     def _values(self, film: Film, guides: Guides) -> dict[str, Any]:
         return {
@@ -90,17 +91,17 @@ class Statistics:
             "slopes": self._slopes,
         }
 
-    def _pool(self, patches: Patches, values: Mapping[str, Any], least: int = 1) -> None:
-        patches.launch("measure_cells", _FILE, values, least=least)
-        patches.launch_cells("pool_cells", _FILE, values, layout.CLASSES, least)
-        spread_cells(patches, _RULES, self._rules, self.column_rules, least)
-        patches.launch_items("find_spans", _FILE, values, max(patches.count, least))
+    def _pool(self, patches: Patches, values: Mapping[str, Any]) -> None:
+        patches.launch("measure_cells", _FILE, values)
+        patches.launch_cells("pool_cells", _FILE, values, layout.CLASSES)
+        spread_cells(patches, _RULES, self._rules, self.column_rules)
+        patches.launch_items("find_spans", _FILE, values, max(patches.count, 1))
 
     def _sum_columns(
         self, patches: Patches, grid: TileGrid, values: Mapping[str, Any], sums: cl.Buffer, least: int = 1
     ) -> None:
         own = {**values, "row_count": grid.tile_size}
-        patches.launch("tile_columns", "tile_columns", own, rows=grid.tile_size, least=least)
+        patches.launch("tile_columns", "tile_columns", own, rows=grid.tile_size)
         rows = grid.rows * len(layout.TileSum)
         own = {
             "row_total": rows,
@@ -112,11 +113,11 @@ class Statistics:
         patches.launch_items("sum_columns", "sum_columns", own, max(rows * grid.columns, least))
 
 
-def spread_cells(patches: Patches, planes: int, cells: cl.Buffer, columns: cl.Buffer, least: int = 1) -> None:
+def spread_cells(patches: Patches, planes: int, cells: cl.Buffer, columns: cl.Buffer) -> None:
     """Interpolate planes with a float for each cell along the rows: to `columns`, with a float for each
     column of pixels of each row of cells."""
     values = {"plane_total": planes, "cell_values": cells, "column_values": columns}
-    patches.launch_rows("spread_cells", _FILE, values, planes * patches.cell_rows, least)
+    patches.launch_rows("spread_cells", _FILE, values, planes * patches.cell_rows)
 
 
 @cache
