@@ -16,6 +16,11 @@ PASSES = (0, 10, 2, 8, 5, 15, 7, 13, 1, 11, 3, 9, 4, 14, 6, 12)
 """The pixel of each square of 4 x 4 that each pass takes: an ordered dither (Bayer 1973), so that those of
 any number of passes lie evenly."""
 
+_CLOSE = 1e-3
+"""How near to the camera boxes are cut off, as a share of the distance of their farthest corner."""
+_EDGES = np.array([(i, i | 1 << axis) for i in range(8) for axis in range(3) if not i >> axis & 1]).T
+"""(2, 12) the corners at both ends of each edge of a box, in the order of `affine.box_corners`."""
+
 
 def squares(grid: TileGrid, chosen: npt.NDArray[np.bool_]) -> IntArray:
     """The first tile of each square of 4 x 4 tiles in which one of the chosen tiles (grid.count,) lies."""
@@ -28,11 +33,11 @@ def squares(grid: TileGrid, chosen: npt.NDArray[np.bool_]) -> IntArray:
 
 
 def windows(grid: TileGrid, camera: Camera, objects: tuple[Object, ...]) -> list[Window]:
-    """The rectangles around what is seen of the bounds of each object. Corners behind the camera do not
-    count."""
+    """The rectangles around what is seen of the bounds of each object."""
     found = []
     for obj in objects:
-        places, in_front = camera.project(affine.box_corners(obj.world_bounds), grid.width / grid.height)
+        corners = _cut_off(camera, affine.box_corners(obj.world_bounds))
+        places, in_front = camera.project(corners, grid.width / grid.height)
         if not in_front.any():
             continue
         pixels = places[in_front] * (grid.width, grid.height)
@@ -42,6 +47,19 @@ def windows(grid: TileGrid, camera: Camera, objects: tuple[Object, ...]) -> list
         if (low < high).all():
             found.append((int(low[0]), int(low[1]), int(high[0]), int(high[1])))
     return found
+
+
+def _cut_off(camera: Camera, corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """The corners of a box (8, 3), and where its edges pass through a plane close before the camera, if it
+    lies on both sides of that: what is seen of it may reach as far as these points."""
+    forward = camera.image_plane(1.0)[2]
+    depth = (corners - np.asarray(camera.position)) @ forward
+    plane = _CLOSE * float(np.abs(depth).max())
+    first, last = _EDGES
+    cut = (depth[first] > plane) != (depth[last] > plane)
+    first, last = first[cut], last[cut]
+    share = (plane - depth[first]) / (depth[last] - depth[first])
+    return np.concatenate([corners, corners[first] + share[:, None] * (corners[last] - corners[first])])
 
 
 def seen_tiles(grid: TileGrid, camera: Camera, objects: tuple[Object, ...]) -> IntArray:

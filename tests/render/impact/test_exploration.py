@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,9 +12,10 @@ from support.small_scenes import mixed_scene
 
 from incpt.core import affine
 from incpt.core.layout import SlotFlag
-from incpt.render.impact.exploration import PASSES, seen_tiles, squares
+from incpt.render.impact.exploration import PASSES, seen_tiles, squares, windows
 from incpt.render.plan import Cursor, Queue, plan_step
 from incpt.render.tiles import TileGrid, base_queue
+from incpt.scene.camera import Camera
 
 grids = st.builds(TileGrid, st.integers(1, 90), st.integers(1, 90), st.sampled_from([1, 3, 8, 16]))
 
@@ -106,3 +109,18 @@ def test_what_is_behind_the_camera_is_not_seen() -> None:
 def test_a_sparse_entry_needs_an_index_before_the_first_sample() -> None:
     with pytest.raises(AssertionError, match="index before the first"):
         plan_step(TileGrid(8, 8, 8), sparse_queue(np.zeros(1, np.int32), 0), Cursor(), 1, np.zeros(1, int))
+
+
+def test_an_object_that_reaches_behind_the_camera_is_seen_to_the_edge() -> None:
+    """Of a floor under the camera corners are behind it, and it fills the picture up to the horizon."""
+    scene = mixed_scene()
+    grid = TileGrid(80, 40, 8)
+    camera = Camera(position=(0, 1.0, 0), target=(0, 0.6, -1), fov_y=60)
+    floor = replace(scene.object("floor"), scale=(20, 1, 20))
+    (window,) = windows(grid, camera, (floor,))
+    left, top, right, bottom = window
+    assert (left, right, bottom) == (0, 80, 40) and 0 < top <= 12
+    narrow = replace(floor, scale=(0.5, 1, 20))  # as wide as the picture at its near end
+    assert windows(grid, camera, (narrow,))[0][::2] == (0, 80)
+    assert windows(grid, replace(camera, target=(0, 3, -1)), (floor,)) == []
+    assert windows(grid, camera, (replace(floor, position=(0, 0, 30)),)) == []
