@@ -8,6 +8,7 @@ device.
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import NoneType
@@ -23,7 +24,7 @@ from incpt.render import first_hits, tiles
 from incpt.render.batch import Batch
 from incpt.render.film import RADIANCE, Film, tile_image
 from incpt.render.first_hits import FirstHits
-from incpt.render.impact.comparison import Comparison, compared
+from incpt.render.impact.comparison import Comparison, Prepared, compared
 from incpt.render.impact.tile_sums import TileSums
 from incpt.render.modes import Mode
 from incpt.render.params import path_params
@@ -84,6 +85,8 @@ class SessionState:
     path_buffer: PathBuffer
     tables: SceneTables
     comparison: Comparison | None = None
+    prepared: Prepared | None = None
+    """What the next comparison can use, where there is none."""
 
     @property
     def measured(self) -> Measured:
@@ -126,6 +129,8 @@ class Session:
         film = _new_film(self.device, settings)
         path_buffer = PathBuffer.of_settings(self.device, settings, None)
         self._state = SessionState(Progress.start(settings, scene, Measured(film)), film, path_buffer, tables)
+        self._ahead: tuple[tuple[str, ...], deque[Callable[[], None]]] | None = None
+        """What `prepare_edit` has begun: the kernels, and what builds those that are left."""
 
     @property
     def scene(self) -> Scene:
@@ -255,7 +260,10 @@ class Session:
 
     def snapshot(self) -> Snapshot:
         """Scene, settings and picture as they are now, for `restore`."""
-        return Snapshot(self.scene, self.progress, self._state.film.sums())
+        film = self._state.film
+        # Nothing is in them.
+        film = film if self.progress.anchor is not None else film.with_planes(())
+        return Snapshot(self.scene, self.progress, film.sums())
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from where a session stood. A tile that was under way then starts again. On an error
@@ -268,7 +276,7 @@ class Session:
         path_buffer = PathBuffer.of_settings(self.device, settings, self._state.path_buffer)
         progress = replace(snapshot.progress, cursor=cursor)
         tables, comparison = self._tables_for(progress, snapshot.scene, None)
-        self._state = SessionState(progress, film, path_buffer, tables, comparison)
+        self._state = SessionState(progress, film, path_buffer, tables, comparison, self._prepared)
 
     def image(self, alpha: bool = False) -> npt.NDArray[np.float32]:
         """(H, W, 3) mean radiance, linear; row 0 is on top. What is not rendered anew yet shows the old
@@ -325,26 +333,83 @@ class Session:
             return None
         return first_hits.object_at(self._tracer, self._tables, self.settings, (x, y))
 
-    def build(self, on_progress: Callable[[int, int], None] | None = None) -> None:
-        """Build every kernel that the scene as it is now needs, so that no later call has to wait for one.
-        `on_progress` is called with how many of how many steps are done; not at all if nothing is to do.
-        What it raises ends the building, which may go on later."""
+    def build(self, on_progress: Callable[[int, int], None] | None = None, for_edits: bool = True) -> None:
+        """Build every kernel that the scene as it is now needs, so that no later call has to wait for one;
+        without `for_edits` all but those that wait for a local edit: see `prepare_edit`. `on_progress` is
+        called with how many of how many steps are done; not at all if nothing is to do. What it raises ends
+        the building, which may go on later."""
         require_call("on_progress", on_progress)
-        kernels = (*self._tables.variant, *map(str, passes_of(self.settings)), self.settings.strategy)
+        require_bool("for_edits", for_edits)
+        built = self.device.built
+        parts = [(self._of_pictures, self._picture_launches)]
+        if for_edits or self._state.comparison is not None:
+            parts.append((self._of_edits, self._edit_launches))
+        todo = [(kernels, launches()) for kernels, launches in parts if kernels not in built]
+        done, total = 0, sum(len(launches) for _, launches in todo)
+        for kernels, launches in todo:
+            for launch in launches:
+                launch()
+                self.device.finish()
+                done += 1
+                if on_progress is not None:
+                    on_progress(done, total)
+            built.add(kernels)
+
+    def prepare_edit(self) -> bool:
+        """Do a piece of what the next local edit would have to wait for, so that a picture can be there
+        before all of it is: build a kernel, make memory, look at the scene. Returns whether more is left.
+        Raises DeviceError where memory runs out."""
+        state, strategy = self._state, strategy_of(self.settings)
+        if self._build_ahead():
+            return True
+        if not strategy.keeps_anchor or state.comparison is not None:
+            return False
+        if not state.film.has_planes(strategy.planes):
+            film, path_buffer = state.film.with_planes(strategy.planes), state.path_buffer
+            self._state = replace(state, film=film, path_buffer=path_buffer.with_pairs(self.device))
+            return True
+        prepared = Prepared.of(self.device, self.size, state.prepared)
+        if prepared is state.prepared and not prepared.has_hits(self.scene):
+            prepared = prepared.with_hits(self._tracer, self._tables, self.settings)
+        self._state = replace(state, prepared=prepared)
+        return not prepared.has_hits(self.scene)
+
+    def _build_ahead(self) -> bool:
+        """Build one of the kernels that wait for a local edit, if there is one."""
+        kernels = self._of_edits
         if kernels in self.device.built:
-            return
+            return False
+        if self._ahead is None or self._ahead[0] != kernels:
+            self._ahead = kernels, deque(self._edit_launches())
+        launches = self._ahead[1]
+        if launches:
+            launches.popleft()()
+            self.device.finish()
+            return True
+        self.device.built.add(kernels)
+        self._ahead = None
+        return False
+
+    @property
+    def _of_pictures(self) -> tuple[str, ...]:
+        """What tells the kernels that pictures need from those of other scenes and settings."""
+        return (*self._tables.variant, *map(str, passes_of(self.settings)))
+
+    @property
+    def _of_edits(self) -> tuple[str, ...]:
+        """As `_of_pictures`, of what local edits need beside."""
+        return (*self._of_pictures, self.settings.strategy)
+
+    def _picture_launches(self) -> list[Callable[[], None]]:
         batch = self._batch(first_hits.one_slot(), self._state.path_buffer)
-        steps = [
+        return [
             *self._tracer.idle_launches(batch),
             *self._state.film.idle_launches(batch.params, batch.path_buffer),
-            *strategy_of(self.settings).idle_launches(self._tracer, batch, self._state.film),
         ]
-        for done, step in enumerate(steps, 1):
-            step()
-            self.device.finish()
-            if on_progress is not None:
-                on_progress(done, len(steps))
-        self.device.built.add(kernels)
+
+    def _edit_launches(self) -> list[Callable[[], None]]:
+        batch = self._batch(first_hits.one_slot(), self._state.path_buffer)
+        return strategy_of(self.settings).idle_launches(self._tracer, batch, self._state.film)
 
     @property
     def _tables(self) -> SceneTables:
@@ -363,7 +428,14 @@ class Session:
             strategy_of(before.settings).fold(state.film, state.comparison)
         if progress.anchor is not None and progress.first_sample != before.first_sample:
             strategy.begin(film)
-        return replace(state, progress=progress, film=film, tables=tables, comparison=comparison)
+        return replace(
+            state,
+            progress=progress,
+            film=film,
+            tables=tables,
+            comparison=comparison,
+            prepared=self._prepared if strategy.keeps_anchor else None,
+        )
 
     def _tables_for(
         self, progress: Progress, scene: Scene, before: Comparison | None
@@ -373,8 +445,16 @@ class Session:
         pool = self._tables.pool
         if progress.anchor is None:
             return tables_of(pool, scene, self._tables), None
-        comparison = compared(self._tracer, progress.settings, progress.anchor, scene, self._tables, before)
+        comparison = compared(
+            self._tracer, progress.settings, progress.anchor, scene, self._tables, before, self._prepared
+        )
         return comparison.tables, comparison
+
+    @property
+    def _prepared(self) -> Prepared | None:
+        """What the next comparison can use of what is there."""
+        comparison = self._state.comparison
+        return self._state.prepared if comparison is None else comparison.prepared
 
     def _configured(self, settings: RenderSettings) -> SessionState:
         """The state under other settings."""

@@ -61,13 +61,14 @@ class Viewer:
         self._reference: Float32Image | None = None
         self._is_pinning = False
         self._rest_is_shown = False
+        self._cannot_prepare = False
         self._step_seconds, self._speed = 0.0, 0.0
         side, seat = self._opened(view, None)
         self._state = ViewerState(view, (side,), (0.0,), clock())
         self._seats: tuple[_Seat, ...] = (seat,)
         pace = Pace(5e6 if self.device.is_cpu else 5e8)
         self._hits = FirstHitReader(seat.session, pace, clock)
-        seat.session.build(on_build)
+        seat.session.build(on_build, for_edits=False)
 
     @property
     def session(self) -> Session:
@@ -86,11 +87,13 @@ class Viewer:
         try:
             had_answer = self._main.is_answered
             if step is not None:
+                if had_answer and self.session.mode is Mode.REFINE:
+                    self._prepare()
                 self._render(step)
                 if had_answer and has_edit_after():
                     return None
             elif self._rest_is_shown:
-                return None
+                return self._frame(resting=True) if self._prepare() else None
             self._rest_is_shown = self._has_first_hits(step is None) and step is None
             return self._frame(resting=self._rest_is_shown)
         except (DeviceError, MemoryError) as error:
@@ -201,7 +204,7 @@ class Viewer:
             session.restart()
         side = self._state.sides[work.side]
         self._note(work.side, scheduler.followed(side, work, session.progress, self._clock()))
-        session.build(self._on_build)
+        session.build(self._on_build, for_edits=False)
         height_width = work.view.size[::-1]
         if self._reference is not None and self._reference.shape[:2] != height_width:
             self._reference = None
@@ -235,6 +238,17 @@ class Viewer:
         spent = tuple(t + seconds * (place == step.side) for place, t in enumerate(step.spent))
         self._state = replace(self._state, spent=spent)
         return report, seconds
+
+    def _prepare(self) -> bool:
+        """Do a piece of what the next edit would wait for; whether more is left."""
+        if self._cannot_prepare or self._main.divisor > 1:
+            return False
+        try:
+            return self.session.prepare_edit()
+        except (DeviceError, MemoryError):
+            # Perhaps no edit comes; one that needs the memory will say what is missing.
+            self._cannot_prepare = True
+            return False
 
     def _has_first_hits(self, is_idle: bool) -> bool:
         """Whether all first hits are there that are wanted; some rows more of them, unless an edit waits for

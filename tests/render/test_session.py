@@ -9,6 +9,7 @@ import pytest
 from support.small_scenes import mixed_scene, small_settings
 
 from incpt.core.errors import DeviceError, InputError
+from incpt.core.settings import STRATEGIES
 from incpt.device.device import Device
 from incpt.render.modes import Mode
 from incpt.render.plan import Cursor, Queue
@@ -139,7 +140,7 @@ def moved(scene: Scene) -> Scene:
 
 
 def test_edit_replaces_tile_by_tile_from_the_point_of_change(device: Device) -> None:
-    session = rendered(device, mixed_scene(slots_per_step=32), 4)
+    session = rendered(device, mixed_scene(strategy="spiral", slots_per_step=32), 4)
     before = session.image()
     session.edit(moved(session.scene))
     assert session.mode is Mode.INCREMENTAL
@@ -156,12 +157,12 @@ def test_edit_replaces_tile_by_tile_from_the_point_of_change(device: Device) -> 
         changed[y : y + 8, x : x + 8] = True
     assert (session.spp() == np.where(changed, 16, 4)).all()
     np.testing.assert_array_equal(after[~changed], before[~changed])
-    fresh = rendered(device, moved(mixed_scene()), 16).image()
+    fresh = rendered(device, moved(mixed_scene(strategy="spiral")), 16).image()
     assert_same(after[changed], fresh[changed])
 
 
 def test_tile_is_shown_only_when_complete(device: Device) -> None:
-    session = rendered(device, mixed_scene(slots_per_step=6), 2)
+    session = rendered(device, mixed_scene(strategy="spiral", slots_per_step=6), 2)
     session.edit(moved(session.scene))
     before = session.image()
     for _ in range(2):
@@ -172,7 +173,7 @@ def test_tile_is_shown_only_when_complete(device: Device) -> None:
 
 
 def test_incremental_ends_in_refine(device: Device) -> None:
-    session = rendered(device, mixed_scene(), 2)
+    session = rendered(device, mixed_scene(strategy="spiral"), 2)
     session.edit(moved(session.scene))
     reports = []
     while session.mode is Mode.INCREMENTAL:
@@ -222,7 +223,7 @@ def test_change_that_nobody_sees_keeps_everything(device: Device) -> None:
 
 
 def test_steps_of_a_drag_are_measured_from_where_it_began(device: Device) -> None:
-    start = mixed_scene()
+    start = mixed_scene(strategy="spiral")
     session = rendered(device, start, 1)
     far = [start.with_object("red cube", position=(x, 0.5, 0.4)) for x in (0.5, 1.0, 2.0)]
     for scene in far:
@@ -235,7 +236,7 @@ def test_steps_of_a_drag_are_measured_from_where_it_began(device: Device) -> Non
 
 
 def test_end_of_a_drag_repeats_with_the_whole_nor(device: Device) -> None:
-    start = mixed_scene(nor=4)
+    start = mixed_scene(strategy="spiral", nor=4)
     session = rendered(device, start, 1)
     end = moved(start)
     session.edit(end, since=start)
@@ -280,7 +281,7 @@ def test_same_scene_again_is_no_edit(device: Device) -> None:
 
 
 def test_nor_may_change_before_the_first_step_of_an_edit(device: Device) -> None:
-    session = rendered(device, mixed_scene(), 1)
+    session = rendered(device, mixed_scene(strategy="spiral"), 1)
     session.edit(moved(session.scene))
     order = session.queue.tiles
     session.configure(replace(session.settings, nor=3))
@@ -355,7 +356,7 @@ def test_no_kernel_is_built_after_building(
     for scene in (mixed_scene(), bright, bright.without_object("lamp"), opaque):
         monkeypatch.setattr(device, "_kernels", {})
         monkeypatch.setattr(device, "built", set())
-        session = Session(scene, device=device)
+        session = Session(scene, settings=replace(scene.settings, strategy="spiral"), device=device)
         session._tracer = session._tracer if in_blocks else Wavefront(device)
         seen: list[tuple[int, int]] = []
         session.build(lambda *progress: seen.append(progress))  # noqa: B023
@@ -370,6 +371,56 @@ def test_no_kernel_is_built_after_building(
             assert session.pick((22, 14)) == "red cube"
             session.build(lambda *_: pytest.fail("is built already"))
         assert_same(session.image(), rendered(device, moved(scene), 17).image())
+
+
+@pytest.mark.parametrize(("strategy", "in_blocks"), [*((s, True) for s in STRATEGIES), ("impact", False)])
+def test_an_edit_that_was_prepared_builds_nothing(
+    device: Device, monkeypatch: pytest.MonkeyPatch, strategy: str, in_blocks: bool
+) -> None:
+    monkeypatch.setattr(device, "_kernels", {})
+    monkeypatch.setattr(device, "built", set())
+    session = Session(mixed_scene(strategy=strategy), device=device)
+    session._tracer = session._tracer if in_blocks else Wavefront(device)
+    session.build(for_edits=False)
+    session.render(3)
+    image, pieces = session.image(), 0
+    while session.prepare_edit():
+        pieces += 1
+    assert (pieces > 6) == (strategy == "impact")
+    assert not session.prepare_edit()
+    assert_same(session.image(), image)
+    with monkeypatch.context() as patch:
+        patch.setattr(device, "build", None)
+        # Planes of the picture's size are there.
+        asked: list[int] = []
+        empty = Device.empty
+        patch.setattr(Device, "empty", lambda self, nbytes: (asked.append(nbytes), empty(self, nbytes))[1])
+        session.edit(moved(session.scene))
+        assert sum(asked) < 44 * 28 * 40 * (strategy == "impact") + 100_000
+        session.build(lambda *_: pytest.fail("is built already"))
+        session.render(17)
+        session.image()
+
+
+def test_what_is_prepared_serves_other_edits_and_is_of_the_scene(device: Device) -> None:
+    session = rendered(device, mixed_scene(), 2)
+    while session.prepare_edit():
+        pass
+    estimator = session._state.prepared.estimator  # type: ignore[union-attr]
+    # A turn of the camera shows something else.
+    turned = session.scene.with_camera(fov_y=50)
+    session.edit(turned)
+    session.render(2)
+    for scene in (moved(turned), turned, turned.without_object("lamp")):
+        session.edit(scene)
+        session.render(4)
+        assert session._state.prepared.estimator is estimator  # type: ignore[union-attr]
+    alone = rendered(device, turned, 2)
+    alone.edit(turned.without_object("lamp"))
+    for one in (session, alone):
+        hits, expected = one._state.comparison.hits, one.first_hits()  # type: ignore[union-attr]
+        np.testing.assert_array_equal(hits.objects, expected.object_id)
+        assert_same(hits.normals, expected.normal)
 
 
 def test_building_may_be_stopped_and_go_on(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -390,7 +441,7 @@ def test_building_may_be_stopped_and_go_on(device: Device, monkeypatch: pytest.M
 
 
 def test_point_of_change_may_be_the_pixel(device: Device) -> None:
-    session = rendered(device, mixed_scene(point_of_change="pixel"), 1)
+    session = rendered(device, mixed_scene(strategy="spiral", point_of_change="pixel"), 1)
     session.edit(moved(session.scene), pixel=(43, 27))
     assert session.queue.tiles[0] == session.grid.count - 1
 
@@ -399,14 +450,16 @@ def test_point_of_change_may_be_the_pixel(device: Device) -> None:
 def test_point_of_change_off_screen_starts_at_that_side(
     device: Device, position: tuple[float, float, float], corner: int
 ) -> None:
-    scene = mixed_scene().with_added(Object("far", shape("cube"), "red", position=position))
+    scene = mixed_scene(strategy="spiral").with_added(Object("far", shape("cube"), "red", position=position))
     session = rendered(device, scene, 1)
     session.edit(scene.with_object("far", rotation=(0, 10, 0)))
     assert session.queue.tiles[0] % session.grid.columns == corner
 
 
 def test_edit_behind_the_camera_starts_at_the_centre(device: Device) -> None:
-    scene = mixed_scene().with_added(Object("behind", shape("cube"), "red", position=(0, 1, 9)))
+    scene = mixed_scene(strategy="spiral").with_added(
+        Object("behind", shape("cube"), "red", position=(0, 1, 9))
+    )
     session = rendered(device, scene, 1)
     session.edit(scene.without_object("behind"))
     assert session.mode is Mode.INCREMENTAL

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from incpt.core.settings import RenderSettings
-from incpt.render.film import Film
+from incpt.device.device import Device
+from incpt.render.film import Film, Float32Array
 from incpt.render.first_hits import Window, first_hits
 from incpt.render.impact.anchor import Anchor
+from incpt.render.impact.estimator import Estimator, SeenPair
 from incpt.render.impact.exploration import windows
-from incpt.render.impact.guides import Guides
-from incpt.render.impact.shrinkage import Shrinkage
-from incpt.render.impact.statistics import Statistics
 from incpt.render.impact.tile_sums import TileSums
 from incpt.render.tiles import TileGrid
 from incpt.render.tracer import Tracer
@@ -34,6 +33,30 @@ class CenterHits:
 
 
 @dataclass(frozen=True, eq=False)
+class Prepared:
+    """What comparisons of a session share, and what can be there before the first of them: the estimator, and
+    what is seen in scenes that the next one may be of."""
+
+    estimator: Estimator
+    hits: tuple[CenterHits, ...] = ()
+
+    @classmethod
+    def of(cls, device: Device, size: tuple[int, int], old: Prepared | None) -> Prepared:
+        """One for pictures of that size: `old` where it serves. Raises DeviceError where memory runs out."""
+        if old is not None and old.estimator.size == size:
+            return old
+        return cls(Estimator(device, *size))
+
+    def has_hits(self, scene: Scene) -> bool:
+        """Whether it knows what is seen in a scene."""
+        return any(hits.scene is scene for hits in self.hits)
+
+    def with_hits(self, tracer: Tracer, tables: SceneTables, settings: RenderSettings) -> Prepared:
+        """The same, with what is seen in the scene of the tables alone."""
+        return replace(self, hits=(center_hits(tracer, tables, settings),))
+
+
+@dataclass(frozen=True, eq=False)
 class Comparison:
     """A scene and its anchor.
 
@@ -41,8 +64,8 @@ class Comparison:
     anchor       the scene that the kept picture is of.
     tables       the scene as it is now. Both choose their lights from one table.
     changes      what paths can meet of their difference.
-    guides       which pixels are filtered together.
-    statistics   of the pairs that a film has, and `shrinkage` makes the picture; both hold what they work in.
+    estimator    makes the picture of pairs.
+    seen         what the pixels show of both.
     anchor_hits  what is seen in the anchor, and `hits` in the scene.
     """
 
@@ -50,25 +73,31 @@ class Comparison:
     anchor: SceneTables
     tables: SceneTables
     changes: ChangeTables
-    guides: Guides
-    statistics: Statistics
-    shrinkage: Shrinkage
+    estimator: Estimator
+    seen: SeenPair
     anchor_hits: CenterHits
     hits: CenterHits
+
+    @property
+    def prepared(self) -> Prepared:
+        """What the next comparison can use of it."""
+        return Prepared(self.estimator, (self.anchor_hits, self.hits))
 
     def compares(self, anchor: Scene, scene: Scene) -> bool:
         """Whether it is that of these two scenes."""
         return self.anchor.scene is anchor and self.tables.scene is scene
 
-    def update(self, film: Film) -> None:
-        """Make the picture of what the film has of pairs."""
-        self.statistics.update(film, self.guides)
-        self.shrinkage.update(film, self.guides, self.statistics)
+    def image(self, film: Film) -> Float32Array:
+        """(H, W, 4) the picture of what the film has of pairs. It waits for the device."""
+        return self.estimator.image(film, self.seen)
+
+    def fold(self, film: Film) -> None:
+        """Make the picture the kept one of the film, with the samples that its pixels are worth."""
+        self.estimator.fold(film, self.seen)
 
     def tile_sums(self, film: Film) -> TileSums:
         """What the film has of pairs, tile by tile. It waits for the device."""
-        self.statistics.update(film, self.guides)
-        return self.statistics.tile_sums(film, self.guides, self.grid)
+        return self.estimator.tile_sums(film, self.seen, self.grid)
 
 
 def compared(
@@ -78,29 +107,24 @@ def compared(
     scene: Scene,
     tables: SceneTables,
     before: Comparison | None = None,
+    prepared: Prepared | None = None,
 ) -> Comparison:
     """The comparison of a scene with its anchor. `tables` are those of the scene before the edit, with which
-    the new ones share what they can; `before`: its comparison. Raises DeviceError."""
+    the new ones share what they can; `before`: its comparison, or else `prepared`. Raises DeviceError."""
     pool, device = tables.pool, tracer.device
     grid = TileGrid(*settings.size, settings.tile_size)
     if before is not None and before.compares(anchor.scene, scene) and before.grid == grid:
         return before
     old, new = paired_tables(pool, anchor.scene, scene, tables)
-    known = () if before is None or before.grid != grid else (before.anchor_hits, before.hits)
-    found = [hits for hits in known if hits.scene is anchor.scene]
-    anchor_hits = found[0] if found else center_hits(tracer, old, settings)
+    prepared = Prepared.of(device, settings.size, prepared if before is None else before.prepared)
+    if not prepared.has_hits(anchor.scene):
+        prepared = prepared.with_hits(tracer, old, settings)
+    anchor_hits = next(hits for hits in prepared.hits if hits.scene is anchor.scene)
     seen = windows(grid, scene.camera, anchor.affected(scene))
     hits = _followed(anchor_hits, tracer, new, settings, seen)
-    labels, differ = _labels(anchor, anchor_hits, hits, seen)
-    guides = Guides(device, grid.width, grid.height)
-    guides.set(labels, hits.normals, differ)
-    if before is not None and before.grid == grid:
-        statistics, shrinkage = before.statistics, before.shrinkage
-    else:
-        statistics = Statistics(device, grid.width, grid.height)
-        shrinkage = Shrinkage(device, grid.width, grid.height)
+    pair = _seen_pair(anchor, anchor_hits, hits, seen)
     changes = change_tables(device, anchor.scene, scene)
-    return Comparison(grid, old, new, changes, guides, statistics, shrinkage, anchor_hits, hits)
+    return Comparison(grid, old, new, changes, prepared.estimator, pair, anchor_hits, hits)
 
 
 def center_hits(tracer: Tracer, tables: SceneTables, settings: RenderSettings) -> CenterHits:
@@ -130,11 +154,9 @@ def _followed(
     return CenterHits(scene, objects, normals)
 
 
-def _labels(
-    anchor: Anchor, old: CenterHits, new: CenterHits, seen: list[Window]
-) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.bool_]]:
-    """(H, W) a number that is the same where both scenes show the same two objects, and whether what is seen
-    is an object that differs."""
+def _seen_pair(anchor: Anchor, old: CenterHits, new: CenterHits, seen: list[Window]) -> SeenPair:
+    """What the pixel centres show of both scenes: labels are the same where both show the same two
+    objects."""
     number = {obj.name: i for i, obj in enumerate(anchor.scene.objects)}
     for obj in new.scene.objects:
         number.setdefault(obj.name, len(number))
@@ -149,7 +171,7 @@ def _labels(
         before, now = old.objects[inside], common[new.objects[inside]]
         labels[inside] = _label(before, now)
         changed[inside] = (before != now) | differs[before] | differs[now]
-    return labels, changed
+    return SeenPair(labels, new.normals, changed)
 
 
 def _label(before: npt.NDArray[np.int32], now: npt.NDArray[np.int32]) -> npt.NDArray[np.uint32]:

@@ -13,10 +13,8 @@ from incpt.render.batch import Batch
 from incpt.render.film import RADIANCE, Film, Float32Array
 from incpt.render.impact import allocation, exploration, sums
 from incpt.render.impact.comparison import Comparison
-from incpt.render.impact.guides import Guides
+from incpt.render.impact.estimator import Estimator
 from incpt.render.impact.pairs import PairBuffers, PairTracer
-from incpt.render.impact.shrinkage import Shrinkage
-from incpt.render.impact.statistics import Statistics
 from incpt.render.impact.sums import PAIR_SUMS, reduce_pairs
 from incpt.render.modes import Mode
 from incpt.render.plan import CountArray, Queue
@@ -118,8 +116,7 @@ class Impact(Strategy):
         """The anchor's picture with what is found of the change."""
         if comparison is None:
             return super().image(film, None)
-        comparison.update(film)
-        return comparison.shrinkage.image()
+        return comparison.image(film)
 
     def begin(self, film: Film) -> None:
         """Forget the pairs of the scene before."""
@@ -127,25 +124,17 @@ class Impact(Strategy):
 
     def fold(self, film: Film, comparison: Comparison) -> None:
         """Make the picture that is shown the one that is kept, with the samples that its pixels are worth."""
-        comparison.update(film)
-        comparison.shrinkage.fold(film, comparison.guides, comparison.statistics)
+        comparison.fold(film)
 
     def idle_launches(self, tracer: Tracer, batch: Batch, film: Film) -> list[Callable[[], None]]:
         """Those of pairs, statistics and shrinkage."""
         device = film.device
         pairs = PairBuffers.of(device, 64)
         scratch = Film(device, 1, 1, planes=self.planes)
-        guides, statistics, shrinkage = (
-            Guides(device, 1, 1),
-            Statistics(device, 1, 1),
-            Shrinkage(device, 1, 1),
-        )
         return [
             *PairTracer(tracer).idle_launches(batch, pairs),
             *sums.idle_launches(scratch, batch, pairs),
-            *guides.idle_launches(),
-            *statistics.idle_launches(scratch, guides),
-            *shrinkage.idle_launches(scratch, guides, statistics),
+            *Estimator(device, 1, 1).idle_launches(scratch),
         ]
 
 
