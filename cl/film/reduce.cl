@@ -18,7 +18,8 @@
 // is the path buffer, in which the pass begins at plane `first_plane`. `film` and `pending` have CHANNELS
 // planes of sums, and one of the number of samples. A tile whose repetitions take several steps is kept in
 // `pending` until its last one, so that the film shows finished tiles only. A sample with a float that is not
-// finite counts as zero, and `nonfinite` counts it.
+// finite counts as zero, and `nonfinite` counts it. Tiles with any of `replace_flags` replace what is in the
+// film, others are added to it.
 __kernel void reduce(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, TRACED_PARAMETERS, REDUCTION_PARAMETERS) {
     uint tile_pixels = params.tile_size * params.tile_size;
     uint group = (uint)get_global_id(0) / tile_pixels;
@@ -62,7 +63,7 @@ __kernel void reduce(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, TRACED_PARAMETERS, RED
         float value = plane < CHANNELS ? sum[plane] : (float)count;
         value += flags & SLOT_FIRST ? 0.0f : pending[place];
         if (flags & SLOT_LAST)
-            film[place] = value + (flags & SLOT_REPLACE ? 0.0f : film[place]);
+            film[place] = value + (flags & replace_flags ? 0.0f : film[place]);
         else
             pending[place] = value;
     }

@@ -224,6 +224,7 @@ REDUCTION = Group(
     None,
     (
         _count("first_plane", "where the pass begins in the path buffer"),
+        _count("replace_flags", "the flags of slots (layout.SlotFlag) that replace what the film has"),
         _planes("pending", "sums of tiles under way: CHANNELS planes and the number of samples"),
         _planes("film", "sums of finished tiles, as `pending`"),
     ),

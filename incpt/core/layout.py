@@ -384,12 +384,14 @@ class PathList(IntEnum):
 
 class SlotFlag(IntFlag):
     """What becomes of the slots of a tile. FIRST, LAST and REPLACE: see `film.py`. SINGLE: paths have no
-    partner in the scene before the edit, even where they met something that changed."""
+    partner in the scene before the edit, even where they met something that changed. REPLACE_AOVS: what the
+    film has of auxiliary images is of another scene, so that they are replaced where radiance is not."""
 
     FIRST = 1
     LAST = 2
     REPLACE = 4
     SINGLE = 8
+    REPLACE_AOVS = 16
 
 
 class MaterialFlag(IntFlag):

@@ -21,6 +21,7 @@ import numpy.typing as npt
 import pyopencl as cl
 
 from incpt.core import bindings
+from incpt.core.layout import SlotFlag
 from incpt.device.device import BUILD_SIZES, Device
 from incpt.render.plan import Plan
 from incpt.render.tiles import TileGrid
@@ -50,12 +51,19 @@ class FilmPass:
     channels      the floats that each path brings for it, as planes of the path buffer.
     accumulation  what is added up of them.
     resolution    what the picture is made of these sums.
+    is_aov        whether it is an auxiliary image, which some tiles replace though they add to radiance.
     """
 
     name: str
     channels: int
     accumulation: Accumulation = Accumulation.SUM
     resolution: Resolution = Resolution.MEAN
+    is_aov: bool = False
+
+    @property
+    def replace_flags(self) -> SlotFlag:
+        """The flags of slots by which a tile replaces what the film has of this pass."""
+        return SlotFlag.REPLACE | SlotFlag.REPLACE_AOVS if self.is_aov else SlotFlag.REPLACE
 
 
 @dataclass(frozen=True)
@@ -68,9 +76,9 @@ class FilmPlanes:
 
 RADIANCE = FilmPass("radiance", 3)
 """Red, green and blue, as `Session.image` shows them."""
-ALBEDO = FilmPass("albedo", 3)
+ALBEDO = FilmPass("albedo", 3, is_aov=True)
 """Base colour of the first surface, 0 where there is none: the mean over the samples is antialiased."""
-NORMAL = FilmPass("normal", 3)
+NORMAL = FilmPass("normal", 3, is_aov=True)
 """Shading normal of the first surface in world space, 0 where there is none. It points to the outside of the
 face, from whichever side the ray comes. Means are shorter than 1 where the samples of a pixel differ."""
 AOVS = (ALBEDO, NORMAL)
@@ -246,7 +254,12 @@ class _Layer:
     def reduce(self, size: int, **values: Any) -> None:
         """Launch cl/film/reduce.cl over `size` work-items; `values` are its arguments that do not follow from
         the pass."""
-        own = {"first_plane": self.first_plane, "pending": self._pending, "film": self.sums}
+        own = {
+            "first_plane": self.first_plane,
+            "replace_flags": int(self.film_pass.replace_flags),
+            "pending": self._pending,
+            "film": self.sums,
+        }
         self._launch("reduce", self.film_pass.accumulation.value, size, own | values)
 
     def resolve(self, size: int, pixels: int) -> None:

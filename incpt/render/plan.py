@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core import layout
-from incpt.render.tiles import IntArray, TileGrid
+from incpt.render.tiles import BoolArray, IntArray, TileGrid
 
 CountArray = npt.NDArray[np.int64]
 SPARSE_STEP = 4
@@ -102,14 +102,17 @@ def plan_step(
     slot_count: int,
     sample_counts: npt.NDArray[np.integer],
     first_sample: int = 0,
+    stale: BoolArray | None = None,
 ) -> Plan:
     """Fill up to `slot_count` slots from where `cursor` stands in `queue`, but not past its end.
 
     `sample_counts` (grid.count,) is how many samples were drawn of each tile; it must not change while a tile
-    is under way. The first of them had the index `first_sample`. The repetitions of a tile in this step
-    form a group of neighbouring slots with consecutive sample indices. Where a tile has more samples than
-    there are slots, its groups follow in the next steps: FIRST marks the group that starts the tile, LAST the
-    one that completes it.
+    is under way. The first of them had the index `first_sample`. Tiles that are `stale` (grid.count,) replace
+    what the film has of auxiliary images.
+
+    The repetitions of a tile in this step form a group of neighbouring slots with consecutive sample indices.
+    Where a tile has more samples than there are slots, its groups follow in the next steps: FIRST marks the
+    group that starts the tile, LAST the one that completes it.
     """
     begin = queue.slots_before(cursor)
     end = min(begin + slot_count, queue.slot_count)
@@ -138,6 +141,8 @@ def plan_step(
     )
     if queue.singles is not None:
         groups["flags"] += queue.singles[place] * np.uint32(layout.SlotFlag.SINGLE)
+    if stale is not None:
+        groups["flags"] += stale[tiles] * np.uint32(layout.SlotFlag.REPLACE_AOVS)
     finishes = completes
     if queue.subsets is not None:
         subset = queue.subsets[place]

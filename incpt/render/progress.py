@@ -13,11 +13,12 @@ import numpy as np
 
 from incpt.core.settings import PICTURE_SETTINGS, RenderSettings
 from incpt.render.impact.anchor import Anchor
+from incpt.render.impact.exploration import seen_tiles
 from incpt.render.modes import Event, Mode, next_mode
 from incpt.render.plan import CountArray, Cursor, Plan, Queue, counts_after, is_done, plan_step
 from incpt.render.strategies import strategy_of
 from incpt.render.strategy import Measurements, Situation
-from incpt.render.tiles import IntArray, TileGrid
+from incpt.render.tiles import BoolArray, IntArray, TileGrid
 from incpt.scene.change import Change, affected_objects, diff
 from incpt.scene.model import Object, Scene
 
@@ -35,6 +36,8 @@ class Progress:
     kept          (grid.count,) samples behind each tile beside those drawn.
     anchor        the scene that this one is compared with, whose picture the film's radiance is; None: it is
                   that of this scene.
+    stale         (grid.count,) whether auxiliary images still show the scene before an edit there, though
+                  radiance does not; None where there are none of these images.
     """
 
     settings: RenderSettings
@@ -46,6 +49,7 @@ class Progress:
     first_sample: int
     kept: CountArray
     anchor: Anchor | None = None
+    stale: BoolArray | None = None
 
     @cached_property
     def tile_spp(self) -> CountArray:
@@ -69,7 +73,9 @@ class Progress:
 
     def planned(self, slot_count: int) -> Plan:
         """The next step, of so many slots at most."""
-        return plan_step(self.grid, self.queue, self.cursor, slot_count, self.drawn, self.first_sample)
+        return plan_step(
+            self.grid, self.queue, self.cursor, slot_count, self.drawn, self.first_sample, self.stale
+        )
 
     def after_step(self, plan: Plan, scene: Scene, film: Measurements) -> Progress:
         """What follows once `plan` is in the film; at the end of the queue, with the next one."""
@@ -77,7 +83,11 @@ class Progress:
         if self.queue.replaces and kept.any():
             kept = kept.copy()
             kept[plan.finished] = 0
-        stepped = replace(self, cursor=plan.cursor, drawn=drawn, kept=kept)
+        stale = self.stale
+        if stale is not None:
+            stale = stale.copy()
+            stale[plan.finished] = False
+        stepped = replace(self, cursor=plan.cursor, drawn=drawn, kept=kept, stale=stale)
         if not is_done(self.queue, plan.cursor):
             return stepped
         return stepped.entering(stepped._next_mode(Event.QUEUE_DONE), scene, film)
@@ -100,14 +110,20 @@ class Progress:
             return self
         mode = self._next_mode(Event.LOCAL_CHANGE)
         if mode is Mode.INCREMENTAL and strategy_of(self.settings).keeps_anchor:
-            return self._compared(old, scene, film, pixel)
+            return self._compared(old, scene, tuple(changed), film, pixel)
         affected = (_affected_locally(since, scene) if since is not None else ()) or tuple(changed)
         return self.entering(mode, scene, film, affected, pixel)
 
     def _compared(
-        self, old: Scene, scene: Scene, film: Measurements, pixel: tuple[float, float] | None
+        self,
+        old: Scene,
+        scene: Scene,
+        changed: tuple[Object, ...],
+        film: Measurements,
+        pixel: tuple[float, float] | None,
     ) -> Progress:
-        """What follows from a local edit of `old` where `scene` is compared with an anchor."""
+        """What follows from a local edit of `old`, which affects the objects `changed`, where `scene` is
+        compared with an anchor."""
         anchor = self.anchor
         if anchor is None or not (self.is_untouched or anchor.serves(old, scene)):
             anchor = Anchor(old, self.tile_spp)
@@ -115,12 +131,30 @@ class Progress:
         none = np.zeros_like(self.drawn)
         # Index first_sample - 1 is that of an exploration.
         other = replace(
-            self, first_sample=self.first_sample + int(self.drawn.max()) + 1, drawn=none, kept=none
+            self,
+            first_sample=self.first_sample + int(self.drawn.max()) + 1,
+            drawn=none,
+            kept=none,
+            stale=self._stale_after(scene, changed),
         )
         if not affected:  # The scene is that of the anchor again, and its picture is there.
             other = replace(other, kept=anchor.worth, anchor=None)
             return other.entering(Mode.REFINE, scene, film)
         return replace(other, anchor=anchor).entering(Mode.INCREMENTAL, scene, film, affected, pixel)
+
+    def _stale_after(self, scene: Scene, changed: tuple[Object, ...]) -> BoolArray | None:
+        """`stale` after an edit that affects the objects `changed`: auxiliary images show something else
+        where these are seen, and nowhere else."""
+        if not self.settings.aovs:
+            return None
+        stale = np.zeros(self.grid.count, np.bool_) if self.stale is None else self.stale.copy()
+        stale[seen_tiles(self.grid, scene.camera, changed)] = True
+        return stale
+
+    @property
+    def has_stale(self) -> bool:
+        """Whether auxiliary images still show something of another scene."""
+        return self.stale is not None and bool(self.stale.any())
 
     @property
     def is_untouched(self) -> bool:
@@ -168,7 +202,7 @@ class Progress:
         begun = self
         if mode is Mode.BASE:
             none = np.zeros_like(self.drawn)
-            begun = replace(self, drawn=none, first_sample=0, kept=none, anchor=None)
+            begun = replace(self, drawn=none, first_sample=0, kept=none, anchor=None, stale=None)
         situation = Situation(
             mode,
             self.settings,
@@ -181,6 +215,7 @@ class Progress:
             self.queue,
             begun.drawn,
             begun.anchor is not None,
+            begun.stale,
         )
         queue = strategy_of(self.settings).queue(situation, order)
         return replace(begun, mode=mode, queue=queue, cursor=Cursor())

@@ -253,7 +253,7 @@ class Session:
         """Step until every pixel shows the scene as it is now with at least `spp` samples."""
         spp = whole("spp", spp, 0)
         require_call("on_step", on_step)
-        while self.mode is not Mode.REFINE or self.tile_spp.min() < spp:
+        while self.mode is not Mode.REFINE or self.tile_spp.min() < spp or self.progress.has_stale:
             report = self.step()
             if on_step is not None:
                 on_step(report)

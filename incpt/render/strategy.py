@@ -34,7 +34,7 @@ from incpt.render.impact.pairs import PairBuffers
 from incpt.render.impact.tile_sums import TileSums
 from incpt.render.modes import Mode
 from incpt.render.plan import CountArray, Plan, Queue
-from incpt.render.tiles import IntArray, TileGrid
+from incpt.render.tiles import BoolArray, IntArray, TileGrid
 from incpt.render.tracer import Tracer
 from incpt.scene.model import Object, Scene
 
@@ -68,6 +68,7 @@ class Situation:
     queue     the queue before this one; None at first.
     drawn     (grid.count,) samples drawn of each tile since the scene is compared with an anchor, which it
               may be where `has_anchor`.
+    stale     (grid.count,) tiles of which auxiliary images still show the scene before an edit; None: none.
     """
 
     mode: Mode
@@ -81,6 +82,7 @@ class Situation:
     queue: Queue | None = None
     drawn: CountArray | None = None
     has_anchor: bool = False
+    stale: BoolArray | None = None
 
 
 @dataclass(frozen=True, eq=False)

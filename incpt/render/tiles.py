@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 IntArray = npt.NDArray[np.int32]
+BoolArray = npt.NDArray[np.bool_]
 Index = TypeVar("Index", int, IntArray)
 FARTHEST_TILE = 1 << 30
 """Bound on the tile coordinates of a point of change: squares of them still fit 64 bits."""

@@ -65,6 +65,9 @@ class Impact(Strategy):
         grid = situation.grid
         # The new place first: who drags an object looks at it.
         seen = exploration.seen_tiles(grid, situation.scene.camera, situation.affected[::-1])
+        if situation.stale is not None:
+            stale = np.flatnonzero(situation.stale).astype(np.int32)
+            seen = np.concatenate([seen, np.setdiff1d(stale, seen)])
         is_seen = np.zeros(grid.count, np.bool_)
         is_seen[seen] = True
         near, all_squares = (exploration.squares(grid, chosen) for chosen in (is_seen, is_seen | True))
