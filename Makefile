@@ -7,7 +7,7 @@ demo test fast lint edit bench:
 pictures:
 	./run render scenes/editing.toml -o scenes/pictures/editing.png --spp 512
 	./run replay scenes/editing.toml scenes/pictures/rotate.edits.toml -o out/rotate --size 480x270 \
-		--nor 64 --base-spp 512 --reference-spp 1024
+		--nor 256 --base-spp 512 --reference-spp 1024
 	cp out/rotate/sheet.png scenes/pictures/rotate.png
 
 # Those of the editor; they need Xvfb and xdotool.

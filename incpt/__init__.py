@@ -5,8 +5,7 @@ scene = incpt.load("scenes/editing.toml")
 session = incpt.Session(scene, size=(960, 540))
 session.render(spp=64)
 session.edit(scene.with_object("red cube", rotation=(0, 30, 35)))
-while session.mode is incpt.Mode.INCREMENTAL:
-    session.step()
+session.render(spp=64)  # until it is worth as much again
 image = session.image()  # (H, W, 3) float32 linear radiance
 ```
 

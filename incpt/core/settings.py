@@ -18,14 +18,16 @@ MAX_IMAGE_PIXELS = 1 << 26
 
 @dataclass(frozen=True)
 class RenderSettings:
-    """Settings of a session. Defaults: thesis, section 4.2 (tile 16, rate 1, 3 bounces, NoR 1/1/256).
+    """Settings of a session. Defaults: thesis, section 4.2 (tile 16, rate 1, 3 bounces, NoR 1/1/256), but for
+    the strategy.
 
     size                  width and height of the image, pixels.
     max_bounces           scattering events after the first hit; 0 is direct light only.
     transmission_bounces  passages through smooth dielectrics, counted apart.
     roulette_depth        scattering events before Russian roulette may end a path.
     tile_size             edge of a tile, pixels.
-    nor                   repetitions of a tile while an edit is re-rendered (NoR of INCREMENTAL).
+    nor                   repetitions of a tile while an edit is re-rendered, under "spiral" (NoR of
+                          INCREMENTAL).
     base_nor              repetitions in BASE and REFINE.
     sample_rate           paths per pixel and slot.
     strategy              "restart" (every edit starts over), "spiral" (the thesis) or "impact" (what an edit
@@ -46,7 +48,7 @@ class RenderSettings:
     nor: int = 256
     base_nor: int = 1
     sample_rate: int = 1
-    strategy: str = "spiral"
+    strategy: str = "impact"
     point_of_change: str = "bounds"
     slots_per_step: int | None = None
     seed: int = 0

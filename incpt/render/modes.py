@@ -2,8 +2,9 @@
 
 BASE         the first coarse picture, from nothing: base queue, what was accumulated is thrown away.
 REFINE       the base queue again and again, accumulated.
-INCREMENTAL  after a local edit: the spiral queue with a high NoR; each finished tile replaces what was
-             accumulated for it, all others keep theirs.
+INCREMENTAL  after a local edit: what it affects comes first, as the strategy says. In the thesis that is the
+             spiral queue with a high NoR; each finished tile replaces what was accumulated for it, all others
+             keep theirs.
 """
 
 from __future__ import annotations

@@ -99,7 +99,7 @@ def test_edits_that_follow_each_other(device: Device) -> None:
     assert plan.left_out == 4
     converged, captures = pictures(plan, device)
     assert set(converged) == {None, 0, 2}  # nothing is captured between the second and the third
-    session = Session(scene(), settings=SETTINGS, device=device)
+    session = Session(scene(), settings=replace(SETTINGS, strategy=SPIRAL.strategy), device=device)
     session.render(3)
     scenes = script.scenes(scene())
     session.edit(scenes[0])

@@ -197,7 +197,7 @@ def test_every_panel_shows_a_frame_of_either_kind(user: Desk) -> None:
             for panel in ("Object", "Scene", "Render", "Method"):
                 user.panel(panel)
         assert user.shows("Step time plot") and user.shows("Error plot")
-        assert set(user.workspace.records.errors) == ({"restart (left)", "spiral"} if split else {"spiral"})
+        assert set(user.workspace.records.errors) == ({"restart (left)", "impact"} if split else {"impact"})
     user.panel("Render")
     assert user.shows("mode") and user.shows("queue") and user.scene is SCENE
 

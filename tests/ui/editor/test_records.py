@@ -23,25 +23,25 @@ def test_a_frame_counts_once() -> None:
     first = frame(0.5)
     records = Records().with_frame(first, 10.0).with_frame(first, 11.0)
     assert records.step_ms.x == (10.0,) and records.step_ms.y == (20.0,)
-    assert records.errors["spiral"].x == (1.0,) and records.errors["spiral"].y == (0.5,)
+    assert records.errors["impact"].x == (1.0,) and records.errors["impact"].y == (0.5,)
 
 
 def test_errors_stand_over_rendering_time_that_grows() -> None:
     records = Records()
     for seconds, error in ((1.0, 0.5), (1.0, 0.4), (2.0, 0.3)):
         records = records.with_frame(frame(error, seconds), seconds)
-    assert records.errors["spiral"].x == (1.0, 2.0) and records.errors["spiral"].y == (0.5, 0.3)
+    assert records.errors["impact"].x == (1.0, 2.0) and records.errors["impact"].y == (0.5, 0.3)
 
 
 def test_another_scene_begins_anew_and_step_times_go_on() -> None:
     records = Records().with_frame(frame(0.5), 1.0)
     records = records.with_frame(frame(0.25, view=View(SCENE.with_camera(fov_y=50))), 2.0)
-    assert records.errors["spiral"].y == (0.25,) and records.step_ms.x == (1.0, 2.0)
+    assert records.errors["impact"].y == (0.25,) and records.step_ms.x == (1.0, 2.0)
 
 
 def test_a_split_view_has_two_curves() -> None:
     records = Records().with_frame(frame(0.5), 1.0).with_frame(frame(0.25, view=View(SCENE, split=True)), 2.0)
-    assert set(records.errors) == {"restart (left)", "spiral"}
+    assert set(records.errors) == {"restart (left)", "impact"}
 
 
 def test_without_a_reference_there_is_no_error() -> None:
@@ -52,4 +52,4 @@ def test_the_oldest_values_go() -> None:
     records = Records()
     for at in range(605):
         records = records.with_frame(frame(1.0, at + 1.0), float(at))
-    assert len(records.step_ms.x) == len(records.errors["spiral"].x) == 600 and records.step_ms.x[0] == 5.0
+    assert len(records.step_ms.x) == len(records.errors["impact"].x) == 600 and records.step_ms.x[0] == 5.0
