@@ -28,8 +28,6 @@ ROUND_GROWTH = 0.6
 """Paths of a round as a share of those drawn before it: what is known changes less and less."""
 LONGEST_ROUND = 8.0
 """Paths of the longest round, as a multiple of one path for each pixel."""
-SEEN_SAMPLES = 2
-"""Samples of tiles in which the edited objects are seen, before anything is measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,9 +70,8 @@ class Impact(Strategy):
         is_seen[seen] = True
         near, all_squares = (exploration.squares(grid, chosen) for chosen in (is_seen, is_seen | True))
         everywhere = np.concatenate([near, np.setdiff1d(all_squares, near)])
-        samples = np.full(len(seen), SEEN_SAMPLES, np.int64)
-        singles, worth = np.zeros(len(seen), np.bool_), np.zeros(grid.count, np.int64)
-        return _round(everywhere, 0, seen, samples, singles, worth)
+        once, singles = np.ones(len(seen), np.int64), np.zeros(len(seen), np.bool_)
+        return _round(everywhere, 0, seen, once, singles, worth=np.zeros(grid.count, np.int64))
 
     def _next_round(self, situation: Situation) -> Round:
         grid, queue = situation.grid, situation.queue
