@@ -28,8 +28,9 @@ _RESTED = "rest +"
 
 @dataclass(frozen=True)
 class Variant:
-    """A way to bring the picture up to date: a strategy, with its NoR where it has one; `denoised`: what is
-    shown has gone through a denoiser. In a drag `rest_nor` takes the place of the NoR once the drag is over.
+    """A way to bring the picture up to date: a strategy, with its NoR where it has one; `adapts`: the NoR
+    does; `denoised`: what is shown has gone through a denoiser. In a drag `rest_nor` takes the place of the
+    NoR once the drag is over.
 
     A variant of a strategy by another setting gets a field here, and a line in `variants`.
     """
@@ -37,13 +38,14 @@ class Variant:
     label: str
     strategy: str
     nor: int | None = None
+    adapts: bool = False
     denoised: bool = False
     rest_nor: int | None = None
 
     def settings(self, settings: RenderSettings) -> RenderSettings:
         """Those of a session that works this way."""
         nor = settings.nor if self.nor is None else self.nor
-        return replace(settings, strategy=self.strategy, nor=nor, aovs=self.denoised)
+        return replace(settings, strategy=self.strategy, nor=nor, nor_adapts=self.adapts, aovs=self.denoised)
 
     @property
     def slug(self) -> str:
@@ -67,6 +69,7 @@ def variants(nors: Iterable[int]) -> list[Variant]:
         Variant(RESTART, "restart"),
         Variant(DENOISED, "restart", denoised=True),
         *spirals,
+        Variant("spiral adapting", "spiral", adapts=True),
         Variant(IMPACT, "impact"),
     ]
 

@@ -74,7 +74,8 @@ def _error(measure: str, metric: str, mark: str, record: Record) -> float | None
 
 def best_spiral(errors: Errors) -> float | None:
     """The least error of those with a fixed NoR."""
-    return min((error for name, error in errors.items() if name.startswith("spiral")), default=None)
+    fixed = (error for name, error in errors.items() if re.fullmatch(r"spiral \d+", name))
+    return min(fixed, default=None)
 
 
 def better(errors: Errors) -> float | None:

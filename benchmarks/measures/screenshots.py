@@ -54,9 +54,9 @@ def opened(spp: int) -> Iterator[Hand]:
         )
         with as_file(files("incpt.scenes") / "editing.toml") as path:
             scene = registry.load(path)
-        app = App(
-            Document(replace(scene, settings=replace(scene.settings, size=SIZE, nor=NOR)), name="editing")
-        )
+        # The method of the thesis, whose tiles can be seen to come.
+        settings = replace(scene.settings, size=SIZE, strategy="spiral", nor=NOR, nor_adapts=False)
+        app = App(Document(replace(scene, settings=settings), name="editing"))
         try:
             hand = Hand(app)
             refine(hand, spp)

@@ -134,7 +134,12 @@ def tasks(device: ProfiledDevice, plan: Plan) -> list[Task]:
 def _settings(name: str, size: tuple[int, int], nor: int = FULL_NOR) -> RenderSettings:
     bench = KNOWN[name]
     return RenderSettings(
-        size=size, max_bounces=bench.max_bounces, transmission_bounces=bench.transmission_bounces, nor=nor
+        size=size,
+        max_bounces=bench.max_bounces,
+        transmission_bounces=bench.transmission_bounces,
+        strategy="spiral",
+        nor=nor,
+        nor_adapts=False,
     )
 
 

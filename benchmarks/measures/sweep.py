@@ -72,9 +72,7 @@ def cases(script: EditScript, settings: RenderSettings, grid: Grid) -> list[Case
         Case(
             edit,
             variant,
-            replace(
-                settings, tile_size=tile, max_bounces=bounces, strategy=variant.strategy, nor=variant.nor
-            ),
+            replace(variant.settings(settings), tile_size=tile, max_bounces=bounces),
         )
         for bounces, edit, tile, variant in itertools.product(
             grid.bounces, script.edits, grid.tile_sizes, grid.variants

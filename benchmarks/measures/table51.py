@@ -105,7 +105,7 @@ def _task(
     marks: Marks,
     pictures: _Pictures,
 ) -> Task:
-    chosen = replace(settings, strategy=variant.strategy, nor=variant.nor)
+    chosen = variant.settings(settings)
     subject = edit_subject(bench, edit, chosen, marks, 0)
 
     def measure(work: Work) -> Outcome:

@@ -58,7 +58,8 @@ class IncptPeer:
         """Put an object elsewhere, as a step of a drag; seconds until the kept picture shows the tiles
         nearest to it as they are now, with as many samples as they get in a drag."""
         session = self._prepared(_DRAG_NOR, seed)
-        session.configure(replace(session.settings, sample_rate=1, strategy="spiral", nor=_DRAG_NOR))
+        spiral = {"strategy": "spiral", "nor": _DRAG_NOR, "nor_adapts": False}
+        session.configure(replace(session.settings, sample_rate=1, **spiral))  # type: ignore[arg-type]
         session.render(_DRAG_NOR)
         scene = session.scene.with_object(name, position=position)
         began = time.perf_counter()

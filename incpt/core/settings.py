@@ -28,6 +28,9 @@ class RenderSettings:
     tile_size             edge of a tile, pixels.
     nor                   repetitions of a tile while an edit is re-rendered, under "spiral" (NoR of
                           INCREMENTAL).
+    nor_adapts            whether `nor` is the most, and tiles are repeated as often as the rest of the
+                          picture was; those of the edited object come at once, repeated 1, 4, 16 ... times.
+                          Where it is off, every tile is repeated `nor` times (the thesis).
     base_nor              repetitions in BASE and REFINE.
     sample_rate           paths per pixel and slot.
     strategy              "restart" (every edit starts over), "spiral" (the thesis) or "impact" (what an edit
@@ -46,6 +49,7 @@ class RenderSettings:
     roulette_depth: int = 4
     tile_size: int = 16
     nor: int = 256
+    nor_adapts: bool = True
     base_nor: int = 1
     sample_rate: int = 1
     strategy: str = "impact"
@@ -67,6 +71,7 @@ class RenderSettings:
                 continue
             object.__setattr__(self, name, whole(name, value, low, high))
         require_bool("aovs", self.aovs)
+        require_bool("nor_adapts", self.nor_adapts)
         one_of("strategy", self.strategy, STRATEGIES)
         one_of("point_of_change", self.point_of_change, POINTS_OF_CHANGE)
 

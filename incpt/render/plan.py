@@ -37,7 +37,7 @@ class Cursor:
 class Queue:
     """Tiles in the order in which they are rendered. Nobody can write to the arrays any more.
 
-    tiles     (N,) the order; each tile at most once, but for sparse entries.
+    tiles     (N,) the order. Where a tile comes again, a step ends before it does.
     samples   (N,) paths per pixel of each of them, one at least. Each path per pixel fills a slot.
     replaces  whether a finished tile replaces what the film has of it, with samples counted from 0 (BASE,
               INCREMENTAL), or is added to it and counts on from there (REFINE).
@@ -115,7 +115,7 @@ def plan_step(
     group that starts the tile, LAST the one that completes it.
     """
     begin = queue.slots_before(cursor)
-    end = min(begin + slot_count, queue.slot_count)
+    end = min(begin + slot_count, queue.slot_count, _slots_without_repetition(queue, cursor, slot_count))
     assert slot_count > 0 and begin < end, "a step needs a slot and a queue that is not done"
 
     last = int(np.searchsorted(queue.ends, end))
@@ -154,6 +154,17 @@ def plan_step(
         finished_samples=queue.samples[place][finishes],
         cursor=Cursor(last + 1) if completes[-1] else Cursor(last, end - int(tile_begin[-1])),
     )
+
+
+def _slots_without_repetition(queue: Queue, cursor: Cursor, slot_count: int) -> int:
+    """The slots of a queue up to where a tile comes again in a step of so many slots. Sparse entries do not
+    count, whose pixels have a sample of their own."""
+    tiles = queue.tiles[cursor.tiles : cursor.tiles + slot_count]
+    first = np.unique(tiles, return_index=True)[1]
+    if queue.subsets is not None or len(first) == len(tiles):
+        return queue.slot_count
+    again = int(np.setdiff1d(np.arange(len(tiles)), first)[0])
+    return int(queue.ends[cursor.tiles + again - 1])
 
 
 def _thin_out(groups: npt.NDArray[np.void], subset: npt.NDArray[np.int8], first_sample: int) -> None:

@@ -216,6 +216,7 @@ class Progress:
             begun.drawn,
             begun.anchor is not None,
             begun.stale,
+            self.cursor,
         )
         queue = strategy_of(self.settings).queue(situation, order)
         return replace(begun, mode=mode, queue=queue, cursor=Cursor())

@@ -33,7 +33,7 @@ from incpt.render.impact.comparison import Comparison
 from incpt.render.impact.pairs import PairBuffers
 from incpt.render.impact.tile_sums import TileSums
 from incpt.render.modes import Mode
-from incpt.render.plan import CountArray, Plan, Queue
+from incpt.render.plan import CountArray, Cursor, Plan, Queue
 from incpt.render.tiles import BoolArray, IntArray, TileGrid
 from incpt.render.tracer import Tracer
 from incpt.scene.model import Object, Scene
@@ -65,7 +65,7 @@ class Situation:
               before the drag, and where the scene is compared with an anchor, as they were there. Empty where
               no object changed.
     pixel     the point of change that came with the edit, (x, y) from the top left, or None.
-    queue     the queue before this one; None at first.
+    queue     the queue before this one; None at first. `cursor` is how far it got.
     drawn     (grid.count,) samples drawn of each tile since the scene is compared with an anchor, which it
               may be where `has_anchor`.
     stale     (grid.count,) tiles of which auxiliary images still show the scene before an edit; None: none.
@@ -83,6 +83,7 @@ class Situation:
     drawn: CountArray | None = None
     has_anchor: bool = False
     stale: BoolArray | None = None
+    cursor: Cursor = Cursor()
 
 
 @dataclass(frozen=True, eq=False)

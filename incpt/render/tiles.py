@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 IntArray = npt.NDArray[np.int32]
 BoolArray = npt.NDArray[np.bool_]
+NO_TILES: IntArray = np.zeros(0, np.int32)
 Index = TypeVar("Index", int, IntArray)
 FARTHEST_TILE = 1 << 30
 """Bound on the tile coordinates of a point of change: squares of them still fit 64 bits."""

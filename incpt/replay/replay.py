@@ -43,6 +43,10 @@ class Variant:
         """Whether the NoR makes a difference."""
         return STRATEGIES_BY_NAME[self.strategy].uses_nor
 
+    def settings(self, settings: RenderSettings) -> RenderSettings:
+        """Those of a session that works this way: with the NoR as it is, as in the thesis."""
+        return replace(settings, strategy=self.strategy, nor=self.nor, nor_adapts=False)
+
     @property
     def label(self) -> str:
         """For people."""
@@ -166,7 +170,7 @@ class Replay:
                     yield Converged(timed.index, references[timed.index])
             for variant in self.variants:
                 session.restore(start)
-                session.configure(replace(self.settings, strategy=variant.strategy, nor=variant.nor))
+                session.configure(variant.settings(self.settings))
                 yield from _edit_session(session, run, variant, references, on_step)
 
     def _converge(self, session: Session, scene: Scene, what: str, on_step: OnStep) -> FloatImage:

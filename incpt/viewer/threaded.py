@@ -148,7 +148,8 @@ class ThreadedRenderer:
                 self._post(Problem(_explain(error)))
                 continue
             if frame is None:
-                self._wait_for_news(view)
+                if not viewer.prepare():
+                    self._wait_for_news(view)
             elif self._is_worth_showing(frame):
                 self._post(frame)
                 if viewer.device.is_cpu:

@@ -88,16 +88,28 @@ class Viewer:
             had_answer = self._main.is_answered
             if step is not None:
                 if had_answer and self.session.mode is Mode.REFINE:
-                    self._prepare()
+                    self.prepare()
                 self._render(step)
                 if had_answer and has_edit_after():
                     return None
             elif self._rest_is_shown:
-                return self._frame(resting=True) if self._prepare() else None
+                return None
             self._rest_is_shown = self._has_first_hits(step is None) and step is None
             return self._frame(resting=self._rest_is_shown)
         except (DeviceError, MemoryError) as error:
             raise RenderingStoppedError(_explain(error)) from error
+
+    def prepare(self) -> bool:
+        """Do a bounded piece of what the next edit would wait for; returns whether more is left. `advance`
+        does one with each step; where it has nothing to do, there is time for all."""
+        if self._cannot_prepare or self._main.divisor > 1:
+            return False
+        try:
+            return self.session.prepare_edit()
+        except (DeviceError, MemoryError):
+            # Perhaps no edit comes; one that needs the memory will say what is missing.
+            self._cannot_prepare = True
+            return False
 
     def pick(self, point: tuple[float, float]) -> str | None:
         """The name of the object at a point (x, y) from the top left in units of the image, or None."""
@@ -238,17 +250,6 @@ class Viewer:
         spent = tuple(t + seconds * (place == step.side) for place, t in enumerate(step.spent))
         self._state = replace(self._state, spent=spent)
         return report, seconds
-
-    def _prepare(self) -> bool:
-        """Do a piece of what the next edit would wait for; whether more is left."""
-        if self._cannot_prepare or self._main.divisor > 1:
-            return False
-        try:
-            return self.session.prepare_edit()
-        except (DeviceError, MemoryError):
-            # Perhaps no edit comes; one that needs the memory will say what is missing.
-            self._cannot_prepare = True
-            return False
 
     def _has_first_hits(self, is_idle: bool) -> bool:
         """Whether all first hits are there that are wanted; some rows more of them, unless an edit waits for

@@ -387,15 +387,16 @@ def test_impact_on_the_command_line(
     assert printed.err.count("skipped: restart + OIDN: pyoidn is not installed") == 1
     found = read(tmp_path / "out" / "impact.jsonl")
     assert [(r.subject["measure"], r.subject["variant"]) for r in found.records] == [
-        ("steps", "restart"), ("steps", "spiral 4"), ("steps", "impact"),
+        ("steps", "restart"), ("steps", "spiral 4"), ("steps", "spiral adapting"), ("steps", "impact"),
         ("drags", "restart"), ("drags", "spiral 16, then 64"), ("drags", "impact"),
-        ("seconds", "restart"), ("seconds", "spiral 4"), ("seconds", "impact"),
+        ("seconds", "restart"), ("seconds", "spiral 4"), ("seconds", "spiral adapting"),
+        ("seconds", "impact"),
     ]  # fmt: skip
     assert all(0 < row["normalized_rmse"] < 0.5 for record in found.records for row in record.rows)
-    assert [len(record.rows) for record in found.records] == [1] * 3 + [7] * 3 + [1] * 3
+    assert [len(record.rows) for record in found.records] == [1] * 4 + [7] * 3 + [1] * 4
     assert found.records[0].subject["size"] == [29, 29] and found.records[0].load == {}
     assert main.main(command) == 0
-    assert "9 of 12 measurements were there" in capsys.readouterr().err
+    assert "11 of 14 measurements were there" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -100,7 +100,10 @@ def test_pixels_of_tiles_that_are_cut() -> None:
 
 def test_orders_bring_the_same_radiance() -> None:
     bench = SCENES["cornell"]
-    session = OrderedSession(bench.scene, settings=RenderSettings(size=(96, 64), nor=8, max_bounces=2))
+    session = OrderedSession(
+        bench.scene,
+        settings=RenderSettings(size=(96, 64), strategy="spiral", nor=8, nor_adapts=False, max_bounces=2),
+    )
     session.render(1)
     session.edit(bench.scene.with_object(bench.moves, rotation=(0, 1, 0)))
     tiles = spiral_tiles(session, 1)

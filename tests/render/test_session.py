@@ -140,7 +140,7 @@ def moved(scene: Scene) -> Scene:
 
 
 def test_edit_replaces_tile_by_tile_from_the_point_of_change(device: Device) -> None:
-    session = rendered(device, mixed_scene(strategy="spiral", slots_per_step=32), 4)
+    session = rendered(device, mixed_scene(strategy="spiral", nor_adapts=False, slots_per_step=32), 4)
     before = session.image()
     session.edit(moved(session.scene))
     assert session.mode is Mode.INCREMENTAL
@@ -157,12 +157,12 @@ def test_edit_replaces_tile_by_tile_from_the_point_of_change(device: Device) -> 
         changed[y : y + 8, x : x + 8] = True
     assert (session.spp() == np.where(changed, 16, 4)).all()
     np.testing.assert_array_equal(after[~changed], before[~changed])
-    fresh = rendered(device, moved(mixed_scene(strategy="spiral")), 16).image()
+    fresh = rendered(device, moved(mixed_scene(strategy="spiral", nor_adapts=False)), 16).image()
     assert_same(after[changed], fresh[changed])
 
 
 def test_tile_is_shown_only_when_complete(device: Device) -> None:
-    session = rendered(device, mixed_scene(strategy="spiral", slots_per_step=6), 2)
+    session = rendered(device, mixed_scene(strategy="spiral", nor_adapts=False, slots_per_step=6), 2)
     session.edit(moved(session.scene))
     before = session.image()
     for _ in range(2):
@@ -173,7 +173,7 @@ def test_tile_is_shown_only_when_complete(device: Device) -> None:
 
 
 def test_incremental_ends_in_refine(device: Device) -> None:
-    session = rendered(device, mixed_scene(strategy="spiral"), 2)
+    session = rendered(device, mixed_scene(strategy="spiral", nor_adapts=False), 2)
     session.edit(moved(session.scene))
     reports = []
     while session.mode is Mode.INCREMENTAL:
@@ -223,7 +223,7 @@ def test_change_that_nobody_sees_keeps_everything(device: Device) -> None:
 
 
 def test_steps_of_a_drag_are_measured_from_where_it_began(device: Device) -> None:
-    start = mixed_scene(strategy="spiral")
+    start = mixed_scene(strategy="spiral", nor_adapts=False)
     session = rendered(device, start, 1)
     far = [start.with_object("red cube", position=(x, 0.5, 0.4)) for x in (0.5, 1.0, 2.0)]
     for scene in far:
@@ -236,7 +236,7 @@ def test_steps_of_a_drag_are_measured_from_where_it_began(device: Device) -> Non
 
 
 def test_end_of_a_drag_repeats_with_the_whole_nor(device: Device) -> None:
-    start = mixed_scene(strategy="spiral", nor=4)
+    start = mixed_scene(strategy="spiral", nor_adapts=False, nor=4)
     session = rendered(device, start, 1)
     end = moved(start)
     session.edit(end, since=start)
@@ -281,7 +281,7 @@ def test_same_scene_again_is_no_edit(device: Device) -> None:
 
 
 def test_nor_may_change_before_the_first_step_of_an_edit(device: Device) -> None:
-    session = rendered(device, mixed_scene(strategy="spiral"), 1)
+    session = rendered(device, mixed_scene(strategy="spiral", nor_adapts=False), 1)
     session.edit(moved(session.scene))
     order = session.queue.tiles
     session.configure(replace(session.settings, nor=3))
@@ -441,7 +441,7 @@ def test_building_may_be_stopped_and_go_on(device: Device, monkeypatch: pytest.M
 
 
 def test_point_of_change_may_be_the_pixel(device: Device) -> None:
-    session = rendered(device, mixed_scene(strategy="spiral", point_of_change="pixel"), 1)
+    session = rendered(device, mixed_scene(strategy="spiral", nor_adapts=False, point_of_change="pixel"), 1)
     session.edit(moved(session.scene), pixel=(43, 27))
     assert session.queue.tiles[0] == session.grid.count - 1
 
@@ -450,14 +450,16 @@ def test_point_of_change_may_be_the_pixel(device: Device) -> None:
 def test_point_of_change_off_screen_starts_at_that_side(
     device: Device, position: tuple[float, float, float], corner: int
 ) -> None:
-    scene = mixed_scene(strategy="spiral").with_added(Object("far", shape("cube"), "red", position=position))
+    scene = mixed_scene(strategy="spiral", nor_adapts=False).with_added(
+        Object("far", shape("cube"), "red", position=position)
+    )
     session = rendered(device, scene, 1)
     session.edit(scene.with_object("far", rotation=(0, 10, 0)))
     assert session.queue.tiles[0] % session.grid.columns == corner
 
 
 def test_edit_behind_the_camera_starts_at_the_centre(device: Device) -> None:
-    scene = mixed_scene(strategy="spiral").with_added(
+    scene = mixed_scene(strategy="spiral", nor_adapts=False).with_added(
         Object("behind", shape("cube"), "red", position=(0, 1, 9))
     )
     session = rendered(device, scene, 1)

@@ -12,19 +12,23 @@ from support.small_scenes import mixed_scene
 from incpt.core.settings import STRATEGIES, RenderSettings
 from incpt.device.device import Device
 from incpt.render.film import Film, FilmPass, Resolution
+from incpt.render.impact.exploration import seen_tiles
 from incpt.render.modes import Mode
-from incpt.render.plan import CountArray
+from incpt.render.plan import CountArray, Cursor
 from incpt.render.session import Session
 from incpt.render.strategies import (
     RESTART,
     STRATEGIES_BY_NAME,
+    SpiralQueue,
     point_of_change,
     strategy_of,
 )
 from incpt.render.strategy import Situation, Step, Strategy
 from incpt.render.tiles import IntArray, TileGrid, base_queue, spiral_queue
 
-SETTINGS = RenderSettings(size=(44, 28), tile_size=8, nor=5, base_nor=2, sample_rate=3)
+SETTINGS = RenderSettings(
+    size=(44, 28), tile_size=8, strategy="spiral", nor=5, nor_adapts=False, base_nor=2, sample_rate=3
+)
 GRID = TileGrid(44, 28, 8)
 SPIRAL = STRATEGIES_BY_NAME["spiral"]
 
@@ -66,6 +70,61 @@ def test_spiral_starts_at_what_the_edit_affects() -> None:
     point_px = point_of_change(scene.camera, affected, 44, 28)
     np.testing.assert_array_equal(queue.tiles, spiral_queue(GRID, point_px))
     assert (queue.samples == 5 * 3).all() and queue.replaces
+
+
+def adapting(nor: int, spp: int, **changes: object) -> Situation:
+    """An edit of the red cube, which goes to the left, where every tile had so many samples."""
+    cube = mixed_scene().object("red cube")
+    return situation(
+        Mode.INCREMENTAL,
+        settings=replace(SETTINGS, nor=nor, nor_adapts=True, sample_rate=1),
+        tile_spp=np.full(GRID.count, spp, np.int64),
+        affected=(cube, replace(cube, position=(-1.2, 0.5, 0.5))),
+        **changes,
+    )
+
+
+def test_repetitions_of_a_spiral_grow_where_the_object_is_seen() -> None:
+    edit = adapting(nor=64, spp=20)
+    queue = SPIRAL.queue(edit)
+    assert isinstance(queue, SpiralQueue) and queue.replaces
+    # The new place comes before the old one.
+    new = seen_tiles(GRID, edit.scene.camera, edit.affected[1:])
+    near = queue.near
+    assert near[: len(new)].tolist() == new.tolist() and len(near) > len(new)
+    assert queue.samples.tolist() == [1] * len(near) + [4] * len(near) + [16] * len(near) + [20] * GRID.count
+    for start in (0, len(near), 2 * len(near), 3 * len(near)):
+        np.testing.assert_array_equal(queue.tiles[start : start + len(near)], near)
+    last = queue.tiles[3 * len(near) :]
+    assert sorted(last.tolist()) == list(range(GRID.count))
+    spiral = SPIRAL.order(edit)
+    np.testing.assert_array_equal(last[len(near) :], spiral[~np.isin(spiral, near)])
+    assert SPIRAL.queue(adapting(nor=3, spp=20)).samples[-1] == 3
+    assert (SPIRAL.queue(adapting(nor=3, spp=0)).samples == 1).all()
+
+
+def test_what_an_edit_left_unfinished_comes_with_the_next() -> None:
+    first = SPIRAL.queue(adapting(nor=64, spp=20))
+    assert isinstance(first, SpiralQueue)
+    near, passes = first.near, 3 * len(first.near)
+    drum = (mixed_scene().object("grey drum"),)
+    alone = seen_tiles(GRID, mixed_scene().camera, drum)
+    for done, left in ((0, near), (passes, near), (passes + 2, near[2:]), (len(first.tiles), near[:0])):
+        again = replace(adapting(64, 20), affected=drum, queue=first, cursor=Cursor(done))
+        second = SPIRAL.queue(again)
+        assert isinstance(second, SpiralQueue)
+        assert second.near.tolist() == [*alone, *(tile for tile in left if tile not in alone)]
+
+
+def test_an_order_is_kept_when_the_nor_changes() -> None:
+    edit = adapting(nor=64, spp=20)
+    first = SPIRAL.queue(edit)
+    assert isinstance(first, SpiralQueue)
+    for nor, adapts in ((2, True), (64, False)):
+        settings = replace(edit.settings, nor=nor, nor_adapts=adapts)
+        queue = SPIRAL.queue(replace(edit, settings=settings, queue=first), first.tiles)
+        np.testing.assert_array_equal(queue.tiles[-GRID.count :], first.tiles[-GRID.count :])
+        assert len(queue.tiles) == GRID.count + adapts * len(first.near) and queue.samples[-1] == nor
 
 
 def test_spiral_starts_at_the_pixel_only_where_settings_say_so() -> None:

@@ -264,3 +264,16 @@ def test_planning_a_4k_image_is_quick() -> None:
     # Measured 1 and 3 ms; the bound leaves room for a loaded machine and still rules out a Python loop.
     assert best(lambda: plan_step(grid, queue, Cursor(), grid.count, counts)) < 0.02
     assert best(lambda: spiral_queue(grid, (1e6, -1e6))) < 0.05
+
+
+def test_a_step_ends_before_a_tile_comes_again() -> None:
+    """Two slots of one launch must not replace the same pixels."""
+    grid = TileGrid(32, 8, 8)
+    queue = Queue(np.array([2, 3, 2, 3, 0, 1], np.int32), np.array([1, 1, 4, 4, 4, 4]), True)
+    cursor, steps = Cursor(), []
+    while cursor.tiles < len(queue.tiles):
+        step = plan_step(grid, queue, cursor, 6, np.zeros(4, int))
+        assert len(set(step.finished.tolist())) == len(step.finished)
+        steps.append((step.finished.tolist(), len(step.slots)))
+        cursor = step.cursor
+    assert steps == [([2, 3], 2), ([2], 6), ([3, 0], 6), ([1], 4)]

@@ -74,9 +74,7 @@ def test_separate_edits_each_start_from_the_base_picture(device: Device) -> None
         (i, v, s) for i, steps in ((0, (0, 3)), (1, (1,))) for v in (RESTART, SPIRAL) for s in steps
     ]
     for capture in captures:
-        session = Session(
-            scene(), settings=replace(SETTINGS, strategy=capture.variant.strategy), device=device
-        )
+        session = Session(scene(), settings=capture.variant.settings(SETTINGS), device=device)
         session.render(5)
         for _ in range(script[capture.edit].step):
             session.step()
@@ -99,7 +97,7 @@ def test_edits_that_follow_each_other(device: Device) -> None:
     assert plan.left_out == 4
     converged, captures = pictures(plan, device)
     assert set(converged) == {None, 0, 2}  # nothing is captured between the second and the third
-    session = Session(scene(), settings=replace(SETTINGS, strategy=SPIRAL.strategy), device=device)
+    session = Session(scene(), settings=SPIRAL.settings(SETTINGS), device=device)
     session.render(3)
     scenes = script.scenes(scene())
     session.edit(scenes[0])

@@ -75,18 +75,47 @@ def frames_until_rest(viewer: Viewer, view: View, most: int = 2000) -> list[Fram
         assert frame is not None
         frames.append(frame)
         if frame.resting:
-            assert_rests(viewer, view)
+            assert viewer.advance(view) is None
             return frames
     raise AssertionError("does not come to rest")
 
 
-def assert_rests(viewer: Viewer, view: View) -> None:
-    """Nothing more is rendered, and at last nothing is prepared either."""
-    steps = 0
-    while (frame := viewer.advance(view)) is not None:
-        assert frame.resting
-        steps += 1
-        assert steps < 100
+def test_the_next_edit_is_prepared_once_there_is_a_picture(
+    make_viewer: MakeViewer, device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(device, "built", set())
+    scene = mixed_scene(strategy="impact")
+    view = view_of(scene, target_spp=4)
+    viewer, _ = make_viewer(view, speed=FAST)
+    pieces: list[Mode] = []
+    prepare = Session.prepare_edit
+    monkeypatch.setattr(
+        Session, "prepare_edit", lambda session: (pieces.append(session.mode), prepare(session))[1]
+    )
+    frames = frames_until_rest(viewer, view)
+    assert 0 < len(pieces) < len(frames) and set(pieces) == {Mode.REFINE}
+    while viewer.prepare():
+        assert len(pieces) < 100
+    assert len(pieces) > 10
+    with monkeypatch.context() as patch:
+        patch.setattr(device, "build", None)
+        frames_until_rest(viewer, view_of(moved(scene), target_spp=5))
+
+
+def test_what_cannot_be_prepared_is_left_to_the_edit(
+    make_viewer: MakeViewer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = mixed_scene(strategy="impact")
+    viewer, _ = make_viewer(view_of(scene), speed=FAST)
+    tried: list[int] = []
+
+    def fail(session: Session) -> bool:
+        tried.append(1)
+        raise DeviceError("no memory")
+
+    monkeypatch.setattr(Session, "prepare_edit", fail)
+    frames_until_rest(viewer, view_of(scene, target_spp=9))
+    assert len(tried) == 1 and not viewer.prepare()
 
 
 def run_to(viewer: Viewer, view: View, condition: Callable[[Frame], bool], most: int = 500) -> Frame:
@@ -179,7 +208,7 @@ def test_end_of_a_drag_of_the_environment_returns_at_once(make_viewer: MakeViewe
 
 
 def test_drag_repeats_less_and_ends_with_the_whole_nor(make_viewer: MakeViewer, device: Device) -> None:
-    scene = mixed_scene(strategy="spiral", nor=32)
+    scene = mixed_scene(strategy="spiral", nor_adapts=False, nor=32)
     viewer, _ = make_viewer(view_of(scene, target_spp=2), speed=FAST)
     frames_until_rest(viewer, view_of(scene, target_spp=2))
     for x in (0.2, 0.3, 0.4):
@@ -197,7 +226,7 @@ def test_drag_repeats_less_and_ends_with_the_whole_nor(make_viewer: MakeViewer, 
 
 
 def test_drag_is_measured_from_where_it_began(make_viewer: MakeViewer) -> None:
-    scene = mixed_scene(nor=32)
+    scene = mixed_scene(strategy="spiral", nor_adapts=False, nor=32)
     viewer, _ = make_viewer(view_of(scene, target_spp=2), speed=1.2e5)
     frames_until_rest(viewer, view_of(scene, target_spp=2))
     for x in (-0.5, -1.0, -1.5):
@@ -210,7 +239,7 @@ def test_drag_is_measured_from_where_it_began(make_viewer: MakeViewer) -> None:
 
 
 def test_every_edit_of_a_fast_drag_is_answered_by_a_tile(make_viewer: MakeViewer) -> None:
-    scene = mixed_scene(strategy="spiral")
+    scene = mixed_scene(strategy="spiral", nor_adapts=False)
     viewer, clock = make_viewer(view_of(scene, target_spp=1), speed=1.2e5)
     frames_until_rest(viewer, view_of(scene, target_spp=1))
     clock.edits, clock.speed = 0, 1.2e4  # so that a tile of the drag, 4 x 64 paths, takes two steps
@@ -253,7 +282,7 @@ def test_steps_take_the_time_they_are_given(make_viewer: MakeViewer, step_ms: fl
 def test_refused_edit_is_told_once_and_the_old_picture_goes_on(
     make_viewer: MakeViewer, device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scene = mixed_scene(strategy="spiral")
+    scene = mixed_scene(strategy="spiral", nor_adapts=False)
     viewer, _ = make_viewer(view_of(scene, target_spp=2))
     frames_until_rest(viewer, view_of(scene, target_spp=2))
     bad = view_of(moved(scene), target_spp=4)
@@ -316,14 +345,14 @@ def test_paused_view_takes_edits_and_renders_nothing(make_viewer: MakeViewer, de
         view = view_of(camera, paused=True)
         frame = viewer.advance(view)
         assert frame is not None and frame.resting and frame.view == view
-        assert_rests(viewer, view)
+        assert viewer.advance(view) is None
     assert clock.now == began and viewer.session.scene == turned(scene, 60)
     end = frames_until_rest(viewer, view_of(turned(scene, 60), target_spp=2))[-1]
     assert_fresh(device, end, turned(scene, 60), 2)
 
 
 def test_split_gives_both_sides_equal_time(make_viewer: MakeViewer) -> None:
-    scene = mixed_scene(strategy="spiral", size=(88, 56))
+    scene = mixed_scene(strategy="spiral", nor_adapts=False, size=(88, 56))
     viewer, _ = make_viewer(view_of(scene, split=True), speed=2e5)
     view = view_of(scene, split=True)
     run_to(viewer, view, lambda frame: all(p.tile_spp.min() >= 2 for p in frame.pictures))
@@ -358,7 +387,7 @@ def test_error_against_a_pinned_reference(make_viewer: MakeViewer) -> None:
 def test_first_hits_come_when_wanted_and_small_while_moving(
     make_viewer: MakeViewer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scene = mixed_scene(strategy="spiral")
+    scene = mixed_scene(strategy="spiral", nor_adapts=False)
     viewer, _ = make_viewer(view_of(scene, target_spp=1))
     assert all(frame.first_hits is None for frame in frames_until_rest(viewer, view_of(scene, target_spp=1)))
     still = view_of(scene, target_spp=1, first_hits=True)
