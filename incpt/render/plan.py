@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core import layout
+from incpt.render.impact.findings import Findings
 from incpt.render.tiles import BoolArray, IntArray, TileGrid
 
 CountArray = npt.NDArray[np.int64]
@@ -49,6 +50,7 @@ class Queue:
               entry's have.
     worth     (grid.count,) samples of the scene as it is now that each tile is worth, where that is not how
               many were drawn; None: it is.
+    findings  what was known of a change when the queue was planned; None: nothing yet, or nobody asks.
     """
 
     tiles: IntArray
@@ -57,6 +59,7 @@ class Queue:
     subsets: npt.NDArray[np.int8] | None = None
     singles: npt.NDArray[np.bool_] | None = None
     worth: CountArray | None = None
+    findings: Findings | None = None
 
     def __post_init__(self) -> None:
         for array in (self.tiles, self.samples, self.subsets, self.singles, self.worth):

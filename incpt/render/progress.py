@@ -14,6 +14,7 @@ import numpy as np
 from incpt.core.settings import PICTURE_SETTINGS, RenderSettings
 from incpt.render.impact.anchor import Anchor
 from incpt.render.impact.exploration import seen_tiles
+from incpt.render.impact.findings import Findings
 from incpt.render.modes import Event, Mode, next_mode
 from incpt.render.plan import CountArray, Cursor, Plan, Queue, counts_after, is_done, plan_step
 from incpt.render.strategies import strategy_of
@@ -61,6 +62,21 @@ class Progress:
         counts = self.drawn + self.kept
         counts.flags.writeable = False
         return counts
+
+    @property
+    def findings(self) -> Findings | None:
+        """What is known of the change since the anchor, as of the last round that ended; None before the
+        first one, and where the scene is compared with no other."""
+        return None if self.anchor is None else self.queue.findings
+
+    @property
+    def error_left(self) -> float | None:
+        """See `Session.error_left`."""
+        if self.mode is Mode.BASE or not strategy_of(self.settings).keeps_anchor:
+            return None
+        if self.anchor is None:
+            return 0.0
+        return 1.0 if self.findings is None else self.findings.error_left
 
     @classmethod
     def start(cls, settings: RenderSettings, scene: Scene, film: Measurements) -> Progress:

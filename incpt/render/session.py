@@ -303,6 +303,14 @@ class Session:
         """(H, W) samples behind each pixel; 0 where the old picture waits to be thrown away."""
         return tile_image(self.grid, self.tile_spp)
 
+    def error_left(self) -> float | None:
+        """How much of an edit is still to be found: the share of the visible error of the change that is
+        left, 1 at the edit and 0 once the picture is as good as before it; as of the last round of samples
+        that ended. `progress.findings` has more of it, tile by tile. None where it is not measured: under
+        strategies that compare no scenes, and while the picture starts over. See
+        incpt/render/impact/findings.py for what it is made of."""
+        return self.progress.error_left
+
     def first_hits(
         self, size: tuple[int, int] | None = None, rows: tuple[int, int] | None = None
     ) -> FirstHits:

@@ -56,6 +56,8 @@ class PictureReader:
             seconds=side.seconds,
             error=self._error,
             strategy=progress.settings.strategy,
+            error_left=progress.error_left,
+            findings=progress.findings,
         )
 
     def _compare(self, image: Float32Image, reference: Float32Image | None, must_be_new: bool) -> None:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from incpt.render import tiles
 from incpt.render.first_hits import FirstHits
+from incpt.render.impact.findings import Findings
 from incpt.render.modes import Mode
 from incpt.scene.model import Scene
 
@@ -59,6 +60,8 @@ class Picture:
     replaced    (count,) bool: tiles finished since the last change of the scene.
     seconds     rendering time since the last change of the scene.
     error       normalized RMSE against the pinned reference, or None.
+    error_left  the share of the visible error of an edit that is left, as `Session.error_left` has it.
+    findings    what is known of the edit, tile by tile; None: nothing yet.
     """
 
     image: Float32Image
@@ -71,6 +74,8 @@ class Picture:
     seconds: float
     error: float | None
     strategy: str
+    error_left: float | None = None
+    findings: Findings | None = None
 
 
 @dataclass(frozen=True, eq=False)

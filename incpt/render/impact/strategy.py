@@ -14,6 +14,7 @@ from incpt.render.film import RADIANCE, Film, Float32Array
 from incpt.render.impact import allocation, exploration, sums
 from incpt.render.impact.comparison import Comparison
 from incpt.render.impact.estimator import Estimator
+from incpt.render.impact.findings import Findings, findings
 from incpt.render.impact.pairs import PairBuffers, PairTracer
 from incpt.render.impact.sums import PAIR_SUMS, reduce_pairs
 from incpt.render.modes import Mode
@@ -97,6 +98,7 @@ class Impact(Strategy):
             granted.samples[chosen],
             granted.singles[chosen],
             worth,
+            findings(found, believed.uncorrelated),
         )
 
     def render(self, step: Step, film: Film) -> int:
@@ -145,9 +147,10 @@ def _round(
     samples: CountArray,
     singles: np.ndarray,
     worth: CountArray,
+    known: Findings | None = None,
 ) -> Round:
     """Pass number `passes` of the exploration over the squares that begin with the tiles `everywhere`, then
-    the chosen tiles."""
+    the chosen tiles; `known` is what is known of the change so far."""
     ones = np.ones(len(everywhere), np.int64)
     subset = exploration.PASSES[passes] if len(everywhere) else -1
     return Round(
@@ -157,5 +160,6 @@ def _round(
         subsets=np.concatenate([subset * ones, np.full(len(chosen), -1)]).astype(np.int8),
         singles=np.concatenate([np.zeros(len(everywhere), np.bool_), singles]),
         worth=worth,
+        findings=known,
         passes=passes + (len(everywhere) > 0),
     )
