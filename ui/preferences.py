@@ -27,7 +27,10 @@ MAX_RECENT = 10
 
 CURVES = ("agx", "filmic", "srgb")
 """Curves of tone mapping, by name."""
-OVERLAYS = ("none", "queue", "replaced", "spp", "object_ids", "normals", "albedo", "depth")
+OVERLAYS = (
+    "none", "queue", "replaced", "spp", "object_ids", "normals", "albedo", "depth",
+    "error_left", "touched", "pairs", "weight",
+)  # fmt: skip
 """What may be laid over the picture, in the order of the menu."""
 NAVIGATIONS = ("blender", "plain")
 """Sets of keys and moves of the mouse; see `bindings`."""

@@ -1,24 +1,33 @@
 """What can be laid over the picture, as small images: the queue, tiles already replaced, samples per pixel,
-and what the rays of the pixel centres hit. Pure numpy; `display` stretches and blends them."""
+what the rays of the pixel centres hit, and what is known of an edit. Pure numpy; `display` stretches and
+blends them."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from incpt.render.first_hits import FirstHits
+from incpt.render.impact.findings import Findings
+from incpt.render.strategies import STRATEGIES_BY_NAME
 from incpt.viewer.view import Picture
 
 Pixels = npt.NDArray[np.uint8]
 """(h, w, 3) or (h, w, 4), sRGB, row 0 on top."""
 Color = tuple[int, int, int]
 """sRGB, 0 to 255."""
+TileColors = tuple[Pixels, npt.NDArray[np.bool_], tuple[tuple[str, Color], ...]]
+"""(count, 3) colours of tiles, (count,) which of them are shown, and the legend."""
 
 NEEDS_FIRST_HITS = frozenset({"object_ids", "normals", "albedo", "depth"})
 """Overlays of first hits: they want a View with `first_hits`."""
+
+NEEDS_FINDINGS = frozenset({"error_left", "touched", "pairs", "weight"})
+"""Overlays of what is known of an edit, which strategies that compare scenes measure."""
 
 _DONE_ALPHA, _WAITING_ALPHA = 90, 255
 """Opacity of tiles that the queue has passed and of those that wait, 0 to 255."""
@@ -28,6 +37,13 @@ _LEAST_SPP_RANGE = 4.0
 """The scale of samples per pixel spans at least this factor."""
 _DEPTH_PERCENTILES = (1.0, 99.0)
 """The scale of depth runs between these percentiles of the depths that were hit."""
+_ERROR_RANGE = (1e-3, 1e-1)
+"""The scale of the error that is left, as shares of the display's range. It stays, so that tiles fade."""
+_PAIRS, _SINGLES = (86, 180, 233), (230, 159, 0)
+"""Colours of tiles whose paths are traced in pairs, and of those that do without, sRGB: two that colour-blind
+eyes tell apart as well (M. Okabe and K. Ito, 2008)."""
+_NOTHING = (128, 128, 128)
+"""Colour beside a word that says why there is nothing to see, sRGB."""
 _GOLDEN_TURN = math.tau * 0.6180339887498949
 """A golden section of a full turn, in radians."""
 
@@ -71,6 +87,8 @@ def build(kind: str, picture: Picture, first_hits: FirstHits | None) -> Overlay 
         return _replaced(picture)
     if kind == "spp":
         return _spp(picture)
+    if kind in NEEDS_FINDINGS:
+        return _of_findings(kind, picture)
     if first_hits is None or kind not in NEEDS_FIRST_HITS:
         return None
     height, width = picture.image.shape[:2]
@@ -126,6 +144,60 @@ def _spp(picture: Picture) -> Overlay:
     values = np.unique(np.rint(np.geomspace(low, high, 5)).astype(np.int64))
     legend = _legend(HEAT, [(f"{v:,}", float(_log_place(v, low, high))) for v in values])
     return _of_tiles(picture, image, legend)
+
+
+def _of_findings(kind: str, picture: Picture) -> Overlay:
+    """Nothing but a word where nothing is known."""
+    if picture.findings is not None:
+        colors, is_shown, legend = _PER_TILE[kind](picture.findings)
+        image = np.concatenate([colors, np.where(is_shown, np.uint8(255), np.uint8(0))[:, None]], axis=1)
+        return _of_tiles(picture, image, legend)
+    nothing = np.zeros((picture.grid.count, 4), np.uint8)
+    return _of_tiles(picture, nothing, ((_why_nothing(picture), _NOTHING),))
+
+
+def _why_nothing(picture: Picture) -> str:
+    if picture.error_left is not None:
+        return "not measured yet" if picture.error_left > 0 else "nothing is left of an edit"
+    if STRATEGIES_BY_NAME[picture.strategy].keeps_anchor:
+        return "the picture starts over"
+    return f"not measured by the strategy {picture.strategy}"
+
+
+def _error_left(found: Findings) -> TileColors:
+    """On a logarithmic scale."""
+    low, high = _ERROR_RANGE
+    colors = color_map(HEAT, _log_place(np.maximum(found.error, low), low, high))
+    steps = [
+        (f"{100 * v:.2g} % of white", float(_log_place(v, low, high))) for v in np.geomspace(low, high, 5)
+    ]
+    return colors, found.error > low, _legend(HEAT, steps)
+
+
+def _touched(found: Findings) -> TileColors:
+    return color_map(VIRIDIS, found.touched), found.touched > 0, _shares(" of the paths")
+
+
+def _weight(found: Findings) -> TileColors:
+    return color_map(VIRIDIS, found.weight), found.touched > 0, _shares("")
+
+
+def _pairs(found: Findings) -> TileColors:
+    colors = color_map(np.array([_PAIRS, _SINGLES], np.float64), found.singles)
+    return colors, found.touched > 0, (("pairs", _PAIRS), ("singles", _SINGLES))
+
+
+_PER_TILE: Mapping[str, Callable[[Findings], TileColors]] = {
+    "error_left": _error_left,
+    "touched": _touched,
+    "pairs": _pairs,
+    "weight": _weight,
+}
+"""The overlays that are made from findings, by kind."""
+
+
+def _shares(of: str) -> tuple[tuple[str, Color], ...]:
+    return _legend(VIRIDIS, [(f"{100 * share:.0f} %{of}", share) for share in np.linspace(0.0, 1.0, 5)])
 
 
 def _of_tiles(

@@ -17,6 +17,10 @@ OVERLAY_TEXTS = {
     "normals": "Normals",
     "albedo": "Albedo",
     "depth": "Depth",
+    "error_left": "Error left",
+    "touched": "Changed paths",
+    "pairs": "Pairs or singles",
+    "weight": "Weight of the old picture",
 }
 """How panel and menu name the overlays, in the order of the menu."""
 

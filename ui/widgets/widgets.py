@@ -60,14 +60,29 @@ def number(
     return result if changed else value
 
 
-def whole_number(label: str, value: int, *, low: int, high: int, speed: float = 0.1, tip: str = "") -> int:
-    """A whole number to drag or to type, held between `low` and `high`."""
-    with row(label, tip) as field:
+def whole_number(
+    label: str,
+    value: int,
+    *,
+    low: int,
+    high: int,
+    speed: float = 0.1,
+    tip: str = "",
+    enabled: bool = True,
+    why_not: str = "",
+) -> int:
+    """A whole number to drag or to type, held between `low` and `high`. Where it is not `enabled`, the tip
+    says `why_not`."""
+    with row(label, tip if enabled else f"{tip}. {why_not}") as field:
         # A file may hold numbers beyond the bounds of the widget, or beyond imgui's 32 bits.
         shown = min(max(value, -(1 << 31)), (1 << 31) - 1)
         flags = imgui.SliderFlags_.always_clamp
+        imgui.begin_disabled(not enabled)
         changed, result = imgui.drag_int(field, shown, speed, low, high, "%d", flags)
+        imgui.end_disabled()
         _note(label, changed)
+        if not enabled and imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
+            imgui.set_tooltip(why_not)
     return result if changed else value
 
 
@@ -140,7 +155,7 @@ def choice(label: str, value: str, options: Sequence[tuple[str, str]], tip: str 
     texts = dict(options)
     with row(label, tip) as field:
         shown = texts.get(value, value)
-        is_open = imgui.begin_combo(field, shown)
+        is_open = imgui.begin_combo(field, shown, imgui.ComboFlags_.height_large)
         places.note(label)
         arrow = imgui.get_frame_height() + imgui.get_style().frame_padding.x
         if imgui.calc_text_size(shown).x > imgui.get_item_rect_size().x - arrow:

@@ -9,6 +9,7 @@ import pytest
 
 from incpt.render import tiles
 from incpt.render.first_hits import FirstHits
+from incpt.render.impact.findings import Findings
 from incpt.render.modes import Mode
 from incpt.ui.display import overlays
 from incpt.ui.preferences import OVERLAYS
@@ -16,6 +17,12 @@ from incpt.viewer.view import Picture
 
 WIDTH, HEIGHT, TILE = 44, 28, 8
 GRID = tiles.TileGrid(WIDTH, HEIGHT, TILE)
+
+
+def findings(**changes: Any) -> Findings:
+    places = np.linspace(0, 1, GRID.count)
+    values = dict.fromkeys(("error", "touched", "singles", "weight"), places)
+    return Findings(0.25, **{name: np.array(value) for name, value in {**values, **changes}.items()})
 
 
 def picture(**changes: Any) -> Picture:
@@ -29,7 +36,9 @@ def picture(**changes: Any) -> Picture:
         "replaced": np.arange(GRID.count) < 7,
         "seconds": 1.0,
         "error": None,
-        "strategy": "spiral",
+        "strategy": "impact",
+        "error_left": 0.25,
+        "findings": findings(),
     }
     return Picture(**{**values, **changes})
 
@@ -101,6 +110,66 @@ def test_samples_that_hardly_differ_look_alike() -> None:
     assert 0 < np.abs(colors[0] - colors[1]).max() < 20
     nothing = overlays.build("spp", picture(tile_spp=np.zeros(GRID.count, np.int64)), None)
     assert nothing is not None and not nothing.image[..., :3].any()
+
+
+def tile_values(**values: float) -> Findings:
+    """Findings that have some values in the third tile, and nothing in the others."""
+    third = np.arange(GRID.count) == 2
+    return findings(
+        **{n: np.where(third, values.get(n, 0.0), 0.0) for n in ("error", "touched", "singles", "weight")}
+    )
+
+
+def third_tile(kind: str, **values: float) -> list[int]:
+    overlay = overlays.build(kind, picture(findings=tile_values(**values)), None)
+    assert overlay is not None
+    flat = overlay.image.reshape(-1, 4)
+    assert not flat[np.arange(GRID.count) != 2, 3].any(), "tiles that an edit left alone stay clear"
+    return list(flat[2].tolist())
+
+
+def test_the_error_that_is_left_fades_on_a_scale_that_stays() -> None:
+    for error, place in ((0.01, 0.5), (0.1, 1.0), (0.7, 1.0)):
+        expected = overlays.color_map(overlays.HEAT, [place])[0].tolist()
+        assert third_tile("error_left", error=error) == [*expected, 255]
+    assert third_tile("error_left", error=0.0009)[3] == 0
+    built = overlays.build("error_left", picture(), None)
+    assert built is not None
+    assert [text for text, _ in built.legend][::2] == ["0.1 % of white", "1 % of white", "10 % of white"]
+
+
+def test_shares_and_weights_run_along_one_map() -> None:
+    half = [*overlays.color_map(overlays.VIRIDIS, [0.5])[0].tolist(), 255]
+    assert third_tile("touched", touched=0.5) == half
+    assert third_tile("weight", touched=0.1, weight=0.5) == half
+    least = [*overlays.color_map(overlays.VIRIDIS, [0.0])[0].tolist(), 255]
+    assert third_tile("weight", touched=0.1) == least, "a tile that starts over is shown"
+
+
+def test_pairs_and_singles_have_colours_of_their_own() -> None:
+    pairs, singles = (third_tile("pairs", touched=0.1, singles=share) for share in (0.0, 1.0))
+    built = overlays.build("pairs", picture(), None)
+    assert built is not None
+    assert dict(built.legend) == {"pairs": tuple(pairs[:3]), "singles": tuple(singles[:3])}
+    assert pairs[2] > pairs[0] and singles[0] > singles[2]
+
+
+@pytest.mark.parametrize(
+    ("error_left", "strategy", "word"),
+    [
+        (None, "spiral", "not measured by the strategy spiral"),
+        (None, "impact", "the picture starts over"),
+        (0.0, "impact", "nothing is left of an edit"),
+        (1.0, "impact", "not measured yet"),
+    ],
+)
+@pytest.mark.parametrize("kind", sorted(overlays.NEEDS_FINDINGS))
+def test_where_nothing_is_known_a_word_says_why(
+    kind: str, error_left: float | None, strategy: str, word: str
+) -> None:
+    overlay = overlays.build(kind, picture(findings=None, error_left=error_left, strategy=strategy), None)
+    assert overlay is not None and not overlay.image[..., 3].any()
+    assert [text for text, _ in overlay.legend] == [word]
 
 
 def test_the_sky_is_left_alone_by_first_hit_overlays() -> None:
