@@ -8,6 +8,7 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from incpt.device.device import all_devices, device_name
+from incpt.render.strategies import strategy_of
 from incpt.scene import edits
 from incpt.scene.model import Object, Scene
 from incpt.ui.commands import camera, command, files, materials, menus, objects, rendering
@@ -143,7 +144,7 @@ class Workspace:
         imgui.separator()
         refusals = Refusals()
         editor.control, editor.preferences, is_restart = render.draw_control(
-            editor.control, editor.preferences, refusals
+            editor.control, editor.preferences, strategy_of(editor.scene.settings).uses_nor, refusals
         )
         if is_restart:
             editor.restart()

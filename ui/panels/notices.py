@@ -8,10 +8,10 @@ from imgui_bundle import imgui
 
 from incpt.scene.selection import Selection
 from incpt.ui.editor.notices import Notice
-from incpt.ui.panels.render import MODE_TEXTS
+from incpt.ui.panels.render import MODE_TEXTS, found_text
 from incpt.ui.rect import Rect
 from incpt.ui.widgets import places, theme
-from incpt.viewer.view import Frame
+from incpt.viewer.view import Frame, Picture
 
 _COLORS = {"done": theme.QUIET, "warning": theme.WARNING, "error": theme.ERROR}
 """Colours of notices, by level."""
@@ -42,13 +42,17 @@ def draw_status_bar(text: str) -> None:
 
 
 def status_text(frame: Frame | None, is_paused: bool, selection: Selection) -> str:
-    """Mode, samples, selection: what one looks for without opening a panel."""
+    """Mode or how much of an edit is found, samples, selection: what one looks for without opening a
+    panel."""
     parts = []
     if frame is not None:
         picture = frame.pictures[-1]
-        parts.append("Paused" if is_paused else MODE_TEXTS[picture.mode])
-        samples = int(picture.tile_spp.min())
-        parts.append(f"{samples:,} {'sample' if samples == 1 else 'samples'} per pixel")
+        found = found_text(picture)
+        if is_paused or found is None:
+            parts.append("Paused" if is_paused else MODE_TEXTS[picture.mode])
+        if found is not None:
+            parts.append(found)
+        parts.append(_samples_text(picture, found is not None))
         if picture.error is not None:
             parts.append(f"RMSE {picture.error:.5f}")
     names = selection.names
@@ -57,6 +61,14 @@ def status_text(frame: Frame | None, is_paused: bool, selection: Selection) -> s
     elif names:
         parts.append(f"{len(names)} objects selected")
     return "   |   ".join(parts)
+
+
+def _samples_text(picture: Picture, is_finding: bool) -> str:
+    if is_finding:
+        # The least counts for nothing: tiles that the edit leaves alone are looked at last.
+        return f"worth {picture.tile_spp.mean():,.0f} samples per pixel on average"
+    samples = int(picture.tile_spp.min())
+    return f"{samples:,} {'sample' if samples == 1 else 'samples'} per pixel"
 
 
 def draw_notices(notices: Sequence[Notice], picture: Rect[float]) -> Notice | None:

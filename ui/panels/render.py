@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -9,6 +10,7 @@ from imgui_bundle import imgui
 
 from incpt.core.settings import STRATEGIES, RenderSettings
 from incpt.render.modes import Mode
+from incpt.render.strategies import strategy_of
 from incpt.ui.editor.state import Control
 from incpt.ui.preferences import Preferences
 from incpt.ui.widgets import places, widgets
@@ -27,6 +29,12 @@ _STRATEGY_TIP = (
     "Restart: an edit starts everything anew. Spiral: from the edit outwards, the rest is kept. "
     "Impact: what the edit changes is measured, and rendered where it is seen"
 )
+_FINDING_TEXT = "Finding what the edit changes"
+_FOUND_TIP = (
+    "What is left is the error of the change that the eye can see. At 100 % the picture is as good as before "
+    "the edit"
+)
+_WITHOUT_NOR = "The strategy that is chosen repeats no tiles"
 _TILE_SIZES = (8, 16, 32, 64, 128)
 """Tile sizes that are offered, in pixels."""
 
@@ -48,6 +56,17 @@ def draw_state(frame: Frame | None) -> None:
         widgets.value_row("Not finite", f"{frame.nonfinite:,} samples", "They count as black")
 
 
+def found_text(picture: Picture) -> str | None:
+    """How much of an edit is found; None where that is not measured, or nothing is left to find."""
+    left = picture.error_left
+    return f"Change found: {_percent_found(left)} %" if left else None
+
+
+def _percent_found(left: float) -> int:
+    # All is found when nothing is left, not when little is.
+    return math.floor(100 * (1 - left))
+
+
 def _resting_text(frame: Frame) -> str | None:
     if not frame.resting:
         return None
@@ -55,11 +74,18 @@ def _resting_text(frame: Frame) -> str | None:
 
 
 def _draw_progress(picture: Picture, resting: str | None) -> None:
-    imgui.text_unformatted(resting or MODE_TEXTS[picture.mode])
+    left = picture.error_left
+    imgui.text_unformatted(resting or (_FINDING_TEXT if left else MODE_TEXTS[picture.mode]))
     places.note("mode")
-    done, total = picture.queue_done, len(picture.queue)
-    imgui.progress_bar(done / max(total, 1), imgui.ImVec2(-1, 0), f"{done:,} of {total:,} tiles")
+    if left:
+        share, text = 1 - left, f"{_percent_found(left)} % of the change found"
+    else:
+        done, total = picture.queue_done, len(picture.queue)
+        share, text = done / max(total, 1), f"{done:,} of {total:,} tiles"
+    imgui.progress_bar(share, imgui.ImVec2(-1, 0), text)
     places.note("queue")
+    if left:
+        imgui.set_item_tooltip(_FOUND_TIP)
 
 
 def draw_device(devices: Sequence[str], current: str) -> str | None:
@@ -69,9 +95,10 @@ def draw_device(devices: Sequence[str], current: str) -> str | None:
 
 
 def draw_control(
-    control: Control, preferences: Preferences, refusals: Refusals
+    control: Control, preferences: Preferences, uses_nor: bool, refusals: Refusals
 ) -> tuple[Control, Preferences, bool]:
-    """Pause, target, resolution; returns both values after this frame, and whether to restart."""
+    """Pause, target, resolution; returns both values after this frame, and whether to restart. `uses_nor`:
+    whether repetitions mean anything to the strategy."""
     with widgets.row("Rendering"):
         paused = control.paused
         if widgets.button("Go on" if paused else "Pause"):
@@ -94,6 +121,7 @@ def draw_control(
     drag_nor = widgets.whole_number(
         "NoR in a drag", preferences.drag_nor, low=1, high=1 << 16,
         tip="Repetitions of a tile while something is dragged; the full NoR starts when it is let go",
+        enabled=uses_nor, why_not=_WITHOUT_NOR,
     )  # fmt: skip
     # A percentage that was not touched stays to the bit, which multiplying and dividing would round.
     scale = preferences.resolution_scale if new_percent == percent else new_percent / 100
@@ -118,7 +146,10 @@ def draw_settings(settings: RenderSettings, refusals: Refusals) -> RenderSetting
         ("transmission_bounces", "Glass bounces", 0, 200, "Passages through smooth dielectrics"),
         ("seed", "Seed", 0, (1 << 31) - 1, "Chooses the random numbers"),
     ):
-        value = widgets.whole_number(label, getattr(settings, name), low=low, high=high, tip=tip)
+        value = widgets.whole_number(
+            label, getattr(settings, name), low=low, high=high, tip=tip,
+            enabled=name != "nor" or strategy_of(settings).uses_nor, why_not=_WITHOUT_NOR,
+        )  # fmt: skip
         settings = refusals.changed(settings, **{name: value})
     width = widgets.whole_number("Width", settings.size[0], low=16, high=8192, speed=2.0, tip="Pixels")
     height = widgets.whole_number("Height", settings.size[1], low=16, high=8192, speed=2.0, tip="Pixels")

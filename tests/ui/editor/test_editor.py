@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from imgui_bundle import imgui
 from support.small_scenes import mixed_scene
 from support.ui_harness import Desk, changes, desk, flat, frame_of, state, tell
 
@@ -22,6 +23,7 @@ from incpt.ui.commands import command, materials, objects, pictures, table
 from incpt.ui.panels.notices import status_text
 from incpt.ui.preferences import DisplaySettings, Preferences
 from incpt.viewer.renderer import Building, Export, Exported, Pin, Problem
+from incpt.viewer.view import Frame
 
 SCENE = mixed_scene(size=(48, 32))
 
@@ -186,6 +188,48 @@ def test_the_status_says_mode_samples_and_selection(user: Desk) -> None:
     user.run("Pause")
     user.run("Select all")
     assert status().startswith("Paused") and "5 objects" in status()
+
+
+def frame_with(user: Desk, error_left: float | None, mode: Mode = Mode.INCREMENTAL) -> Frame:
+    frame = frame_of(user.editor.view, mode, 3)
+    return replace(frame, pictures=(replace(frame.pictures[0], error_left=error_left),))
+
+
+def test_the_status_says_how_far_an_edit_is_found(user: Desk) -> None:
+    def status(error_left: float | None, mode: Mode = Mode.INCREMENTAL) -> str:
+        tell(user, frame_with(user, error_left, mode))
+        return status_text(user.editor.frame, user.editor.control.paused, user.editor.selection)
+
+    assert status(1.0).startswith("Change found: 0 %   |   worth 3 samples per pixel on average")
+    assert status(0.126).startswith("Change found: 87 %") and "Incremental" not in status(0.126)
+    assert status(0.001, Mode.REFINE).startswith("Change found: 99 %"), "something is left"
+    assert status(0.0, Mode.REFINE).startswith("Refine") and status(None).startswith("Incremental")
+    user.run("Pause")
+    assert status(0.5).startswith("Paused   |   Change found: 50 %")
+
+
+@pytest.mark.parametrize(
+    ("error_left", "text"), [(0.25, "Finding"), (0.0, "Incremental"), (None, "Incremental")]
+)
+def test_the_panel_says_how_far_an_edit_is_found(
+    user: Desk, monkeypatch: pytest.MonkeyPatch, error_left: float | None, text: str
+) -> None:
+    texts: list[str] = []
+    bars: list[tuple[float, str]] = []
+    written, bar = imgui.text_unformatted, imgui.progress_bar
+    monkeypatch.setattr(imgui, "text_unformatted", lambda text: (texts.append(text), written(text))[1])
+    monkeypatch.setattr(
+        imgui,
+        "progress_bar",
+        lambda share, size, text: (bars.append((share, text)), bar(share, size, text))[1],
+    )
+    user.panel("Render")
+    tell(user, frame_with(user, error_left))
+    assert any(one.startswith(text) for one in texts)
+    tiles = f"{2:,} of {len(user.editor.frame.pictures[0].queue):,} tiles"  # type: ignore[union-attr]
+    assert bars[-1][1] == ("75 % of the change found" if error_left else tiles)
+    if error_left:
+        assert bars[-1][0] == pytest.approx(0.75)
 
 
 def test_every_panel_shows_a_frame_of_either_kind(user: Desk) -> None:

@@ -15,7 +15,7 @@ from incpt.scene.selection import Selection
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
 from incpt.viewer.renderer import Pin, Restart
 
-SCENE = mixed_scene(size=(48, 32))
+SCENE = mixed_scene(size=(48, 32), strategy="spiral")
 PREFERENCES = Preferences(
     display=DisplaySettings(overlay="spp"), snap=SnapSettings(enabled=True), navigation="blender"
 )
@@ -355,6 +355,18 @@ def test_every_widget_of_the_panels_is_tested(user: Desk) -> None:
 
 
 # --------------------------------------------------------------------------------- what is special in some
+
+
+@pytest.mark.parametrize("strategy", ["restart", "impact"])
+def test_repetitions_are_not_asked_for_where_they_mean_nothing(user: Desk, strategy: str) -> None:
+    turn_to(user, "Render", "lamp")
+    user.choose("Strategy", strategy.capitalize())
+    before = state(user.editor)
+    for label in ("NoR", "NoR in a drag"):
+        user.drag(label, 60)
+    assert changes(before, state(user.editor)) == set()
+    user.drag("Base NoR", 60)
+    assert changes(before, state(user.editor)) == {"scene.settings.base_nor"}
 
 
 def test_a_uniform_scale_keeps_proportions(user: Desk) -> None:
