@@ -278,12 +278,27 @@ class Session:
         tables, comparison = self._tables_for(progress, snapshot.scene, None)
         self._state = SessionState(progress, film, path_buffer, tables, comparison, self._prepared)
 
-    def image(self, alpha: bool = False) -> npt.NDArray[np.float32]:
+    def image(self, alpha: bool = False, first_sight: bool = False) -> npt.NDArray[np.float32]:
         """(H, W, 3) mean radiance, linear; row 0 is on top. What is not rendered anew yet shows the old
-        picture, at first black. With `alpha` (H, W, 4): 0 where there was never a picture of this size."""
+        picture, at first black. With `alpha` (H, W, 4): 0 where there was never a picture of this size.
+        With `first_sight` what an edit moved is drawn at its new place, where no sample of it is there yet
+        and the strategy compares scenes: a guess for whoever looks, from first hits and the old picture's
+        light."""
         require_bool("alpha", alpha)
-        image = strategy_of(self.settings).image(self._state.film, self._state.comparison)
+        require_bool("first_sight", first_sight)
+        film, comparison, progress = self._state.film, self._state.comparison, self.progress
+        image = strategy_of(self.settings).image(film, comparison)
+        if first_sight and comparison is not None and progress.mode is Mode.INCREMENTAL:
+            image = comparison.first_sight.drawn_into(image, film, self.grid, progress.drawn == 0)
         return image if alpha else np.ascontiguousarray(image[..., :3])
+
+    def first_sight(self) -> npt.NDArray[np.float32] | None:
+        """(H, W, 4) what `image` with `first_sight` shows before the first step after an edit, at once: no
+        statistics are made. None where nothing can be drawn so, and once a step was done."""
+        state = self._state
+        if state.comparison is None or not self.progress.is_untouched:
+            return None
+        return state.comparison.first_sight.alone(state.film)
 
     def pass_image(self, name: str) -> npt.NDArray[np.float32]:
         """(H, W, channels) the picture of a pass of the film: "radiance" is `image`. With the setting `aovs`,

@@ -36,13 +36,20 @@ class PictureReader:
         if self._image is None or is_reading_due(
             side, self._version, self._clock() - self._read_at, must_be_new
         ):
-            self._image = self._session.image(alpha=True)
+            self._image = self._session.image(alpha=True, first_sight=True)
             self._version, self._read_at = side.version, self._clock()
         return self._image
 
-    def picture(self, side: Side, reference: Float32Image | None, must_be_new: bool) -> Picture:
-        """What there is to show of a side, compared with `reference` (h, w, 3)."""
-        image = self.image(side, must_be_new)
+    def picture(
+        self,
+        side: Side,
+        reference: Float32Image | None,
+        must_be_new: bool,
+        first_sight: Float32Image | None = None,
+    ) -> Picture:
+        """What there is to show of a side, compared with `reference` (h, w, 3); `first_sight` is shown in
+        place of what the session has."""
+        image = self.image(side, must_be_new) if first_sight is None else first_sight
         self._compare(image, reference, must_be_new)
         progress = side.progress
         return Picture(

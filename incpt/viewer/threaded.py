@@ -159,7 +159,9 @@ class ThreadedRenderer:
         """In a drag, leave the processor to the window while it draws the first picture of an edit: on
         software OpenGL a frame takes twice as long beside rendering. The next edit ends it."""
         view, picture = frame.view, frame.pictures[-1]
-        if view.before is None or view.scene is self._drawn or not picture.replaced.any():
+        # Strategies that compare scenes show what moved from the first picture on.
+        shows_edit = bool(picture.error_left) or bool(picture.replaced.any())
+        if view.before is None or view.scene is self._drawn or not shows_edit:
             return
         self._drawn = view.scene
         with self._condition:

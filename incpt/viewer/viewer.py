@@ -22,6 +22,7 @@ from incpt.render.modes import Mode
 from incpt.render.path_buffer import check_settings
 from incpt.render.session import Session, StepReport
 from incpt.render.strategies import RESTART
+from incpt.scene.model import Scene
 from incpt.viewer import scheduler
 from incpt.viewer.pace import Pace
 from incpt.viewer.picture import FirstHitReader, PictureReader
@@ -62,6 +63,7 @@ class Viewer:
         self._is_pinning = False
         self._rest_is_shown = False
         self._cannot_prepare = False
+        self._sighted: Scene | None = None
         self._step_seconds, self._speed = 0.0, 0.0
         side, seat = self._opened(view, None)
         self._state = ViewerState(view, (side,), (0.0,), clock())
@@ -78,7 +80,7 @@ class Viewer:
     def advance(self, view: View, has_edit_after: Callable[[], bool] = lambda: False) -> Frame | None:
         """Do one bounded piece of work towards `view` and return what there is to show; None: nothing to do,
         and nothing new. `has_edit_after` tells whether another scene waits: then one more picture of this
-        one, which has been answered, is not worth the time to read it.
+        one, which has been answered, is not worth the time to read it, nor is the first sight of it.
 
         What an edit or a setting raises (InputError, DeviceError, MemoryError) comes through once for a view;
         the last good one is rendered on. RenderingStoppedError: a step failed, nothing can go on.
@@ -87,6 +89,9 @@ class Viewer:
         try:
             had_answer = self._main.is_answered
             if step is not None:
+                sight = None if has_edit_after() else self._first_sight()
+                if sight is not None:
+                    return self._frame(resting=False, first_sight=sight)
                 if had_answer and self.session.mode is Mode.REFINE:
                     self.prepare()
                 self._render(step)
@@ -259,14 +264,22 @@ class Viewer:
             return True
         return (main.is_answered or is_idle) and self._hits.advance(view, main)
 
-    def _frame(self, resting: bool) -> Frame:
+    def _first_sight(self) -> Float32Image | None:
+        """What an edit moved, at its new place, before the first step of it; once for each scene."""
+        session = self.session
+        if len(self._seats) > 1 or session.scene is self._sighted:
+            return None
+        self._sighted = session.scene
+        return session.first_sight()
+
+    def _frame(self, resting: bool, first_sight: Float32Image | None = None) -> Frame:
         main, view = self._main, self._state.view
         if self._is_pinning and main.divisor == 1:
             image = self._seats[-1].reader.image(main, must_be_new=True)
             if image[..., 3].min() > 0:
                 self._reference, self._is_pinning = image[..., :3], False
         pictures = tuple(
-            seat.reader.picture(side, self._reference, resting)
+            seat.reader.picture(side, self._reference, resting, first_sight)
             for seat, side in zip(self._seats, self._state.sides, strict=True)
         )
         if not scheduler.shows(main, view):

@@ -494,3 +494,47 @@ def test_the_sides_of_a_split_view_share_their_tables(
         built.append(len(trees))
         del viewer
     assert built[0] == built[1] > 0
+
+
+def impact_view(scene: Scene, **changes: object) -> View:
+    return view_of(replace(scene, settings=replace(scene.settings, strategy="impact")), **changes)
+
+
+def small_cube(x: float = 0.3) -> Scene:
+    return mixed_scene(size=(96, 64)).with_object("red cube", scale=(0.4, 0.4, 0.4), position=(x, 0.2, 0.8))
+
+
+def test_what_an_edit_moved_is_seen_before_its_first_step(make_viewer: MakeViewer) -> None:
+    start = impact_view(small_cube(), target_spp=4)
+    viewer, clock = make_viewer(start)
+    before = frames_until_rest(viewer, start)[-1].pictures[0].image
+    began, dragged = clock.now, start.scene.with_object("red cube", position=(-0.7, 0.2, 0.8))
+    edited = replace(start, scene=dragged, before=start.scene)
+    frame = viewer.advance(edited)
+    assert frame is not None and frame.view == edited and clock.now == began, "a step was done before"
+    picture = frame.pictures[0]
+    changed = np.abs(picture.image - before).max(axis=2) > 0.02
+    now = viewer.session.first_hits().object_id == dragged.object_index["red cube"]
+    assert changed[now].mean() > 0.9 and picture.error_left == 1 and not frame.resting
+    following = viewer.advance(edited)
+    assert following is not None and clock.now > began, "the sight comes once"
+    assert not np.array_equal(following.pictures[0].image, picture.image)
+
+
+def test_while_another_edit_waits_no_sight_is_drawn(make_viewer: MakeViewer) -> None:
+    start = impact_view(small_cube(), target_spp=4)
+    viewer, clock = make_viewer(start)
+    frames_until_rest(viewer, start)
+    began, dragged = clock.now, start.scene.with_object("red cube", position=(-0.7, 0.2, 0.8))
+    viewer.advance(replace(start, scene=dragged, before=start.scene), lambda: True)
+    assert clock.now > began
+
+
+def test_pictures_tell_how_far_an_edit_is_found(make_viewer: MakeViewer) -> None:
+    start = impact_view(small_cube(), target_spp=4)
+    viewer, _ = make_viewer(start)
+    assert frames_until_rest(viewer, start)[-1].pictures[0].error_left == 0
+    edited = replace(start, scene=start.scene.with_object("red cube", position=(-0.7, 0.2, 0.8)))
+    found = run_to(viewer, edited, lambda frame: frame.pictures[0].findings is not None).pictures[0]
+    assert found.findings is not None and found.findings.touched.shape == (found.grid.count,)
+    assert found.error_left == found.findings.error_left == viewer.session.error_left()

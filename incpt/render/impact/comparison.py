@@ -14,22 +14,13 @@ from incpt.render.first_hits import Window, first_hits
 from incpt.render.impact.anchor import Anchor
 from incpt.render.impact.estimator import Estimator, SeenPair
 from incpt.render.impact.exploration import windows
+from incpt.render.impact.first_sight import CenterHits, FirstSight, rows_columns
 from incpt.render.impact.tile_sums import TileSums
 from incpt.render.tiles import TileGrid
 from incpt.render.tracer import Tracer
 from incpt.scene.model import Scene
 from incpt.tables.change_tables import ChangeTables, change_tables
 from incpt.tables.scene_tables import SceneTables, paired_tables
-
-
-@dataclass(frozen=True, eq=False)
-class CenterHits:
-    """What the rays through pixel centres meet first in a scene: the object's place in it, or -1 (H, W), and
-    the shading normal in world space (H, W, 3)."""
-
-    scene: Scene
-    objects: npt.NDArray[np.int32]
-    normals: npt.NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +58,7 @@ class Comparison:
     estimator    makes the picture of pairs.
     seen         what the pixels show of both.
     anchor_hits  what is seen in the anchor, and `hits` in the scene.
+    first_sight  what to show of the scene where it has no sample yet.
     """
 
     grid: TileGrid
@@ -77,6 +69,7 @@ class Comparison:
     seen: SeenPair
     anchor_hits: CenterHits
     hits: CenterHits
+    first_sight: FirstSight
 
     @property
     def prepared(self) -> Prepared:
@@ -124,13 +117,15 @@ def compared(
     hits = _followed(anchor_hits, tracer, new, settings, seen)
     pair = _seen_pair(anchor, anchor_hits, hits, seen)
     changes = change_tables(device, anchor.scene, scene)
-    return Comparison(grid, old, new, changes, prepared.estimator, pair, anchor_hits, hits)
+    sight_before = before.first_sight if before is not None and before.grid == grid else None
+    sight = FirstSight(anchor_hits, hits, seen, sight_before)
+    return Comparison(grid, old, new, changes, prepared.estimator, pair, anchor_hits, hits, sight)
 
 
 def center_hits(tracer: Tracer, tables: SceneTables, settings: RenderSettings) -> CenterHits:
     """What is seen in a scene."""
     found = first_hits(tracer, tables, settings, settings.size)
-    return CenterHits(tables.scene, found.object_id, found.normal)
+    return CenterHits(tables.scene, found.object_id, found.normal, found.albedo)
 
 
 def _followed(
@@ -139,7 +134,7 @@ def _followed(
     """What is seen in the scene of `tables`, which shows something else than `before` in the windows `seen`
     only."""
     scene = tables.scene
-    objects, normals = before.objects, before.normals.copy()
+    objects, normals, colors = before.objects, before.normals.copy(), before.colors.copy()
     if [obj.name for obj in scene.objects] == [obj.name for obj in before.scene.objects]:
         objects = objects.copy()
     else:
@@ -150,8 +145,9 @@ def _followed(
         ]
     for window in seen:
         found = first_hits(tracer, tables, settings, settings.size, window)
-        objects[_inside(window)], normals[_inside(window)] = found.object_id, found.normal
-    return CenterHits(scene, objects, normals)
+        inside = rows_columns(window)
+        objects[inside], normals[inside], colors[inside] = found.object_id, found.normal, found.albedo
+    return CenterHits(scene, objects, normals, colors)
 
 
 def _seen_pair(anchor: Anchor, old: CenterHits, new: CenterHits, seen: list[Window]) -> SeenPair:
@@ -167,7 +163,7 @@ def _seen_pair(anchor: Anchor, old: CenterHits, new: CenterHits, seen: list[Wind
     labels = _label(old.objects, old.objects)
     changed = np.zeros(labels.shape, np.bool_)
     for window in seen:
-        inside = _inside(window)
+        inside = rows_columns(window)
         before, now = old.objects[inside], common[new.objects[inside]]
         labels[inside] = _label(before, now)
         changed[inside] = (before != now) | differs[before] | differs[now]
@@ -179,8 +175,3 @@ def _label(before: npt.NDArray[np.int32], now: npt.NDArray[np.int32]) -> npt.NDA
     filtered together by mistake."""
     pair = (before + 1).astype(np.uint32) * np.uint32(1 << 16) + (now + 1).astype(np.uint32)
     return pair & np.uint32(0x7FFFFFFF)
-
-
-def _inside(window: Window) -> tuple[slice, slice]:
-    left, top, right, bottom = window
-    return slice(top, bottom), slice(left, right)
