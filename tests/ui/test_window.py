@@ -20,6 +20,8 @@ from incpt.benchmarks.kit import desktop
 from incpt.benchmarks.kit.desktop import Hand
 from incpt.formats import registry
 from incpt.render.modes import Mode
+from incpt.render.session import Session
+from incpt.scene.model import Scene
 
 pytestmark = pytest.mark.slow
 
@@ -174,6 +176,61 @@ def test_the_gizmo_moves_the_object_and_the_exported_picture_shows_it_there(
     left_behind = radiance[round(y0) - 4 : round(y0) + 4, round(x0) - 14 : round(x0) - 8].mean(axis=(0, 1))
     assert left_behind[0] < 1.3 * left_behind[2], "the table is grey where the cube was"
     assert {"normal.X", "depth.Z", "object_id"} < set(channels) and any("albedo" in n for n in channels)
+
+
+def test_what_is_dragged_is_seen_at_once_and_leaves_no_ghost(hand: Hand) -> None:
+    """In the first picture of each step of a drag under impact, and in the picture once the edit is found."""
+    from incpt.ui.panels import notices
+
+    editor = hand.app.editor
+    settings = replace(editor.scene.settings, strategy="impact", size=(960, 540))
+    editor.propose(replace(editor.scene, settings=settings), "Strategy")
+    hand.pump(lambda: is_answered(hand) and editor.frame.pictures[-1].tile_spp.min() >= 16)
+    pick(hand, "red cube")
+    start, looks, told = editor.scene, [], []
+
+    def look() -> None:
+        hand.pump(lambda: hand.app.shown_frame.view.scene == editor.scene, frames=0)
+        told.append(notices.status_text(hand.app.shown_frame, False, editor.selection))
+        looks.append((editor.scene, hand.app.shown_frame.pictures[-1].image[..., :3].copy()))
+
+    x, y = hand.middle("gizmo")
+    hand.drag((x + 45, y), (x + 160, y), between=look)
+    keep(hand, "6-dragged-under-impact")
+    assert len({id(scene) for scene, _ in looks}) >= 4
+    assert any(text.startswith("Change found: ") for text in told), told
+    old_place = cube_alone(start, editor.scene)
+    for scene, image in looks[2:]:
+        place = cube_alone(scene, start)
+        assert is_red(image)[place].mean() > 0.9, "the cube is not drawn where it is"
+        left_behind = cube_alone(start, scene)
+        assert is_red(image)[left_behind].mean() < 0.1, "the cube is still drawn where it was"
+
+    hand.pump(lambda: is_answered(hand) and editor.frame.pictures[-1].error_left < 0.25)
+    shown = editor.frame.pictures[-1].image[..., :3]
+    settings = replace(editor.scene.settings, strategy="restart", base_nor=16)
+    session = Session(replace(editor.scene, settings=settings))
+    session.render(64)
+    errors = np.abs(shown - session.image()).max(axis=-1)
+    assert np.quantile(errors[old_place], 0.98) < np.quantile(errors[~old_place], 0.995)
+    keep(hand, "6-found-under-impact")
+
+
+def cube_alone(there: Scene, not_there: Scene) -> np.ndarray:
+    """(H, W) where the cube is seen in one scene and not in the other, without the pixels at its edges."""
+    was, others = (
+        Session(replace(scene)).first_hits().object_id == scene.object_index["red cube"]
+        for scene in (there, not_there)
+    )
+    inner = was.copy()
+    for axis in (0, 1):
+        for by in (-2, 2):
+            inner &= np.roll(was, by, axis) & ~np.roll(others, by, axis)
+    return inner & ~others
+
+
+def is_red(image: np.ndarray) -> np.ndarray:
+    return image[..., 0] > 2 * image[..., 2]
 
 
 def test_tiles_far_from_an_edit_keep_their_samples(hand: Hand) -> None:
