@@ -158,7 +158,8 @@ def _held(hand: Hand, field: str) -> Iterator[tuple[Pointer, tuple[float, float]
 
 
 def _answer_seconds(app: App, pointer: Pointer, place: tuple[float, float]) -> float:
-    """From the motion until a frame is on the screen that shows a tile finished after its edit."""
+    """From the motion until a frame is on the screen that shows what moved, or a tile finished after its
+    edit."""
     before = app.editor.scene
     began = time.perf_counter()
     pointer.move(place)
@@ -173,7 +174,9 @@ def _answer_seconds(app: App, pointer: Pointer, place: tuple[float, float]) -> f
 
 
 def _is_updated(frame: Any) -> bool:
-    return bool(frame.pictures[-1].replaced.any())
+    # Strategies that compare scenes show what moved from the first picture on.
+    picture = frame.pictures[-1]
+    return bool(picture.replaced.any()) or bool(picture.error_left)
 
 
 def _idle(app: App, seconds: float) -> None:
