@@ -188,7 +188,8 @@ def test_the_window_draws_before_a_drag_goes_on(device: Device, monkeypatch: pyt
         edited = moved(scene)
 
         def answers(frame: Frame) -> bool:
-            return frame.view.scene is edited and bool(frame.pictures[0].replaced.any())
+            picture = frame.pictures[0]
+            return frame.view.scene is edited and bool(picture.error_left or picture.replaced.any())
 
         renderer.show(View(edited, before=scene, step_ms=2))
         wait_for(renderer, Frame, answers)

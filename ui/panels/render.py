@@ -34,6 +34,7 @@ _FOUND_TIP = (
     "What is left is the error of the change that the eye can see. At 100 % the picture is as good as before "
     "the edit"
 )
+_ADAPTS_TIP = "NoR is the most: tiles are repeated as often as the rest of the picture was, and the object comes at once"
 _WITHOUT_NOR = "The strategy that is chosen repeats no tiles"
 _TILE_SIZES = (8, 16, 32, 64, 128)
 """Tile sizes that are offered, in pixels."""
@@ -151,6 +152,9 @@ def draw_settings(settings: RenderSettings, refusals: Refusals) -> RenderSetting
             enabled=name != "nor" or strategy_of(settings).uses_nor, why_not=_WITHOUT_NOR,
         )  # fmt: skip
         settings = refusals.changed(settings, **{name: value})
+        if name == "nor" and strategy_of(settings).uses_nor:
+            adapts = widgets.checkbox("NoR adapts", settings.nor_adapts, _ADAPTS_TIP)
+            settings = refusals.changed(settings, nor_adapts=adapts)
     width = widgets.whole_number("Width", settings.size[0], low=16, high=8192, speed=2.0, tip="Pixels")
     height = widgets.whole_number("Height", settings.size[1], low=16, high=8192, speed=2.0, tip="Pixels")
     return refusals.changed(settings, size=(width, height))

@@ -99,9 +99,13 @@ def test_controls_reach_the_renderer(user: Desk) -> None:
     user.type("Target spp", "64")
     user.type("Resolution", "50")
     user.type("Step time", "20")
+    user.choose("Strategy", "Spiral")  # which uses it
     user.type("NoR in a drag", "4")
     user.click("Pause")
-    wanted = replace(before, target_spp=64, resolution_scale=0.5, step_ms=20.0, drag_nor=4, paused=True)
+    scene = user.scene
+    wanted = replace(
+        before, scene=scene, target_spp=64, resolution_scale=0.5, step_ms=20.0, drag_nor=4, paused=True
+    )
     assert user.null.views[-1] == wanted and user.null.views[-1].size == (24, 16)
     user.click("Go on")
     user.type("Target spp", "0")

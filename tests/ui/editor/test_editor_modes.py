@@ -330,7 +330,7 @@ def test_a_paused_edit_waits(table: Table) -> None:
     assert table.renderer.session.mode is INCREMENTAL
     before = table.renderer.session.image()
     table.user.run("Pause")
-    table.renderer.until(lambda frame: not frame.resting)
+    table.renderer.until(lambda frame: not frame.resting and frame.pictures[-1].seconds > 0)
     assert (table.renderer.session.image() != before).any()
 
 

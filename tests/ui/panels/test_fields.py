@@ -98,7 +98,7 @@ CHOICES = [
     ("Object", "Gizmo", "Rotate", "rotate", "tool.operation"),
     ("Object", "Axes", "The object's axes", "local", "tool.space"),
     ("Render", "Strategy", "Restart", "restart", "scene.settings.strategy"),
-    ("Render", "Strategy", "Spiral", "spiral", "scene.settings.strategy"),
+    ("Render", "Strategy", "Impact", "impact", "scene.settings.strategy"),
     ("Render", "Tile size", "32 × 32", 32, "scene.settings.tile_size"),
     ("Method", "Curve", "Filmic", "filmic", "preferences.display.curve"),
     ("Method", "Overlay", "Normals", "normals", "preferences.display.overlay"),
@@ -107,6 +107,7 @@ CHOICES = [
 CHECKBOXES = [
     ("Object", "Double sided", "scene.materials.lamp.double_sided"),
     ("Object", "Snap", "preferences.snap.enabled"),
+    ("Render", "NoR adapts", "scene.settings.nor_adapts"),
     ("Method", "Tile grid", "preferences.display.tile_grid"),
     ("Method", "Outline", "preferences.display.outline"),
     ("Method", "Split view", "preferences.display.split"),
