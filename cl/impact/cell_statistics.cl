@@ -18,6 +18,7 @@ __kernel WIDE void measure_cells(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PA
         const size_t pixel = y * width + x;
         const Pair p = load_pair(pairs, pixels, pixel);
         const Spread spread = spread_of(&p, anchor_sums[3u * pixels + pixel]);
+        const PairSpread pair_spread = pair_spread_of(&p);
         float values[CELL_SUM_PLANES];
         values[CELL_SUM_SAMPLES] = sample_count(&p);
         values[CELL_SUM_PAIRS] = spread.pairs;
@@ -27,6 +28,9 @@ __kernel WIDE void measure_cells(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PA
         values[CELL_SUM_SQUARES_OLD] = spread.squares_old;
         values[CELL_SUM_PRODUCTS] = spread.products;
         values[CELL_SUM_TOUCHED] = p.touched;
+        values[CELL_SUM_FREEDOM_PAIRS] = pair_spread.freedom;
+        values[CELL_SUM_PAIR_SQUARES_OLD] = pair_spread.squares_old;
+        values[CELL_SUM_PAIR_PRODUCTS] = pair_spread.products;
         const ClassShares class = class_shares(labels[pixel]);
 #pragma unroll
         for (uint i = 0u; i < CELL_SUM_PLANES; i++) {
@@ -124,6 +128,10 @@ INLINE void pool_cell(__global const float *sums, __global float *cells, __globa
     // What an object looked like before it changed is a good guess for its looks only if its samples go
     // together with the old ones: what moved has other surfaces in its place.
     const float resemblance = CLAMP(1.5f * old_weight - 0.5f, 0.0f, 1.0f);
+    // What old values cover of the variance of new ones has to be measured as that is: both are nearly the
+    // same where little changed.
+    const float per_freedom = 1.0f / MAX(sum[CELL_SUM_FREEDOM_PAIRS], 1.0f);
+    const float covered = 2.0f * sum[CELL_SUM_PAIR_PRODUCTS] - old_weight * sum[CELL_SUM_PAIR_SQUARES_OLD];
     const float known_share = freedom / (freedom + PRIOR_FREEDOM);
     __global float *rule = rules + class * total + cell;
     const uint next = CLASSES * total;
@@ -132,7 +140,7 @@ INLINE void pool_cell(__global const float *sums, __global float *cells, __globa
     rule[RULE_VARIANCE * next] =
         known_share * new_variance + (class == 1u ? (1.0f - known_share) * new_moment : 0.0f);
     rule[RULE_PRIOR * next] = class == 1u ? 0.0f : (1.0f - known_share) * PRIOR_VARIANCE;
-    rule[RULE_COVERED * next] = known_share * (2.0f * covariance - old_weight * old_variance);
+    rule[RULE_COVERED * next] = known_share * per_freedom * covered;
 }
 
 // Goes over each class of each row of cells. `rules` has RulePlane for each class.

@@ -82,6 +82,28 @@ INLINE Spread spread_of(const Pair *p, float kept) {
     return s;
 }
 
+// How the pairs of one pixel spread around their own means, of which each takes a degree of freedom. Unlike
+// the squares of spread_of, both scenes are measured by the same samples here: where all pairs bring the same
+// twice, nothing is left between them, however few they are.
+typedef struct {
+    float freedom, squares_old, products;
+} PairSpread;
+
+INLINE PairSpread pair_spread_of(const Pair *p) {
+    const float samples = sample_count(p), pairs = pair_count(p);
+    const Vec3 x = new_sum(p), y = old_sum(p);
+    const int spreads = pairs >= 2.0f;
+    const float per_sample = 1.0f / MAX(samples, 2.0f), per_pair = 1.0f / MAX(pairs, 2.0f);
+    const float products = p->joint_moment - dot(x, y) * (1.0f / 3.0f) * per_sample;
+    // Some of the samples may be no pairs: then the mean of the new ones is known better.
+    const float freedom_share = (pairs - 1.0f) * per_pair / (1.0f - per_sample);
+    PairSpread s;
+    s.freedom = spreads ? pairs - 1.0f : 0.0f;
+    s.squares_old = spreads ? MAX(p->old_moment - mean_square(y) * per_pair, 0.0f) : 0.0f;
+    s.products = spreads ? products * freedom_share : 0.0f;
+    return s;
+}
+
 // The old picture, refined by the partners of new samples, as its difference from the anchor.
 INLINE Vec3 refinement_of(const Pair *p, const Anchor *anchor) {
     return scale(1.0f / MAX(anchor->samples + pair_count(p), 1e-20f), old_sum(p));

@@ -27,6 +27,14 @@ INLINE Rule load_rule(__global const float *rules, uint total, uint cell, uint c
     return r;
 }
 
+// The variance of a sample of the change of a pixel, 0 where nothing changed.
+INLINE float change_variance(const Pair *p, const Anchor *anchor, __global const float *cells,
+                             __global const float *rules, uint total, uint cell, uint class) {
+    const Rule rule = load_rule(rules, total, cell, class);
+    const float variance = sample_variance(p, anchor, &rule, weight_of_pairs(p, &rule));
+    return cells[(class * CELL_PLANES + CELL_TOUCHED) * total + cell] > 0.0f ? variance : 0.0f;
+}
+
 // The variance of what a pixel shows, without shrinkage. Where nothing changed that is the refined old
 // picture.
 INLINE float shown_variance(const Pair *p, const Anchor *anchor, __global const float *cells,

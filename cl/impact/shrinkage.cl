@@ -15,7 +15,7 @@
 //     smooth_change   the next coarser scale, and the detail that is lost on the way; after the last one
 //                     also what is left, as a detail of its own
 //     pool_evidence   what cells and those around tell of details
-//     show_change     the picture, with a share of each detail
+//     show_change     the picture, with a share of each detail; and which share of all noise that shows
 //
 // Patches without a change nearby are left out. What the sums hold is never smoothed.
 
@@ -259,14 +259,19 @@ __kernel WIDE void pool_evidence(PICTURE_PARAMETERS, CELL_EVIDENCE_PARAMETERS, P
 // are.
 #define CELLS_COUNT 32.0f
 
-// The share of a detail that is no noise.
+// The share of a detail that is no noise, which is what is shown of it.
 INLINE float signal_share(float signal, float noise) {
     return signal > 0.0f ? signal / (signal + noise) : 0.0f;
 }
 
+// How much of white noise is in each detail, where all pixels belong together: what the passes before it
+// leave, less what the next one leaves.
+__constant float noise_of_detail[SMOOTHING_SCALES + 1u] = {0.859375f, 0.111084f, 0.022488f, 0.005310f,
+                                                           0.001743f};
+
 __kernel WIDE void show_change(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PARAMETERS, GUIDES_PARAMETERS,
                                SPANS_PARAMETERS, BASE_PARAMETERS, DETAILS_PARAMETERS, EVIDENCE_PARAMETERS,
-                               COLUMN_EVIDENCE_PARAMETERS, SHOWN_IMAGE_PARAMETERS) {
+                               COLUMN_EVIDENCE_PARAMETERS, SHOWN_IMAGE_PARAMETERS, SHOWN_SHARES_PARAMETERS) {
     const Patch patch = patch_of(width, height, CELL_SIZE);
     const Patch near = near_change(&patch, height, spans);
     const size_t pixels = (size_t)width * height, size = field_size(width, height);
@@ -280,6 +285,7 @@ __kernel WIDE void show_change(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PARA
                 pairs[PAIR_SAMPLES_0 * pixels + pixel] + pairs[PAIR_SAMPLES_1 * pixels + pixel];
             const float cells_count = CELLS_COUNT / MAX(samples, 1.0f);
             Vec3 light = load_vec3(base_light, pixels, pixel);
+            float shown_share = 0.0f;
 #pragma unroll
             for (size_t i = 0u; i <= SMOOTHING_SCALES; i++) {
                 __global const float *of_cells = column_evidence + CELL_EVIDENCE * i * column_size;
@@ -296,8 +302,11 @@ __kernel WIDE void show_change(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PARA
                     noise = weighted(&noises, weights) + cells_count * noise;
                 }
                 const Vec3 detail = load_vec3(details + 3u * i * pixels, pixels, pixel);
-                light = add(light, scale(signal_share(signal, noise), detail));
+                const float share = signal_share(signal, noise);
+                light = add(light, scale(share, detail));
+                shown_share += noise_of_detail[i] * share;
             }
+            shown_shares[pixel] = shown_share;
             store_pixel(shown_image, pixel, light, anchor_sums[3u * pixels + pixel] + samples > 0.0f);
         }
     }

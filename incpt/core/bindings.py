@@ -360,6 +360,10 @@ SHOWN_IMAGE = Group(
     (_planes("shown_image", "interleaved: the shown radiance, and 1 where there is any"),),
 )
 
+SHOWN_SHARES = Group(
+    "SHOWN_SHARES", None, (_planes("shown_shares", "how much of the noise of its change a pixel shows"),)
+)
+
 # Of the builder of trees, cl/accel/build_bvh.cl, where Box is declared.
 
 ITEMS = Group(
@@ -462,8 +466,7 @@ GROUPS = (
     BLOCK_MEMORY, RADIANCE, CHANGES, PARTNERS, FIRST_HITS, TRACED, REDUCTION, RESOLUTION, PICTURE, PAIRS,
     OLD_VALUES, LABELS, NORMALS, GUIDES, TILE_COLUMNS, COLUMN_SUMS, CELL_SUMS, CELLS, RULES, COLUMN_RULES,
     SPREADING, SPANS, SLOPES, SCALE, HALVES, SMOOTH_HALVES, DETAILS, EVIDENCE, CELL_EVIDENCE,
-    POOLED_EVIDENCE, COLUMN_EVIDENCE, BASE,
-    SHOWN_IMAGE,
+    POOLED_EVIDENCE, COLUMN_EVIDENCE, BASE, SHOWN_IMAGE, SHOWN_SHARES,
     ITEMS, MESH, BOXES, CHUNKS, MEASURES, BINS, SIDES, MOVED, LEVEL, SPLITTING, LINKING, LEAVES, REFITTING,
 )  # fmt: skip
 """Every group."""
@@ -496,7 +499,9 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     "pool_cells": (PICTURE, CELL_SUMS, CELLS, RULES),
     "spread_cells": (PICTURE, SPREADING),
     "find_spans": (PICTURE, CELLS, SPANS),
-    "tile_columns": (PICTURE, PAIRS, LABELS, CELLS, RULES, SLOPES, TILE_COLUMNS),
+    "tile_columns": (
+        *(PICTURE, PAIRS, LABELS, CELLS, RULES, SLOPES, SHOWN_IMAGE, SHOWN_SHARES, TILE_COLUMNS),
+    ),
     "sum_columns": (COLUMN_SUMS,),
     "split_change": (PICTURE, PAIRS, LABELS, CELLS, SPANS, COLUMN_RULES, HALVES, BASE, SHOWN_IMAGE),
     "smooth_change": (
@@ -504,7 +509,8 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     ),
     "pool_evidence": (PICTURE, CELL_EVIDENCE, POOLED_EVIDENCE),
     "show_change": (
-        *(PICTURE, PAIRS, LABELS, GUIDES, SPANS, BASE, DETAILS, EVIDENCE, COLUMN_EVIDENCE, SHOWN_IMAGE),
+        *(PICTURE, PAIRS, LABELS, GUIDES, SPANS, BASE, DETAILS, EVIDENCE, COLUMN_EVIDENCE),
+        *(SHOWN_IMAGE, SHOWN_SHARES),
     ),
     "fold_change": (PICTURE, PAIRS, LABELS, CELLS, SHOWN_IMAGE),
     "bound_faces": (ITEMS, MESH, BOXES),

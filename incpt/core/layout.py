@@ -281,7 +281,9 @@ class PairPlane(IntEnum):
 
 class CellSum(IntEnum):
     """Sums over the pixels of a cell that have one class: NEW_MOMENT of PairPlane, and what `TileSums` has
-    too, here without weights."""
+    too, here without weights. SQUARES_OLD and PRODUCTS are of deviations from the old picture, which the old
+    values of PAIRS refine; PAIR_SQUARES_OLD and PAIR_PRODUCTS from the means of pixels, with FREEDOM_PAIRS:
+    those of `TileSums`."""
 
     SAMPLES = 0
     PAIRS = 1
@@ -291,6 +293,9 @@ class CellSum(IntEnum):
     SQUARES_OLD = 5
     PRODUCTS = 6
     TOUCHED = 7
+    FREEDOM_PAIRS = 8
+    PAIR_SQUARES_OLD = 9
+    PAIR_PRODUCTS = 10
 
 
 class CellPlane(IntEnum):
@@ -332,8 +337,11 @@ class TileSum(IntEnum):
     SQUARES_NEW = 6
     SQUARES_OLD = 7
     PRODUCTS = 8
-    DIFFERENCES = 9
-    ERROR = 10
+    SQUARES_KEPT = 9
+    DIFFERENCES = 10
+    ERROR = 11
+    NOISE = 12
+    SHOWN_NOISE = 13
 
 
 class HalfPlane(IntEnum):

@@ -26,7 +26,11 @@ PAIRS_FIRST = 2.0
 """Pairs per pixel before a tile may do without partners."""
 NEIGHBOURS_WEIGHT = 0.5
 """Samples that the tiles around count for in what is believed of a tile."""
-LEAST_SHARE = 1e-2
+SHOWN_TWICE = 2.0
+"""Noise that is shown counts so many times, since more of it will be with more samples."""
+LEAST_SHOWN = 1e-2
+"""The least share of its noise that a tile counts as showing: a change that drowned in noise is found so."""
+LEAST_SHARE = 1e-3
 """The least variance of a tile, over the mean of all: no tile is left without samples for ever, since what
 was never seen there cannot have been measured."""
 _LEAST_SAMPLES = 1e-6
@@ -94,18 +98,24 @@ def variances(sums: TileSums, columns: int) -> TileVariances:
     v = _ratio(sums.squares_new, sums.freedom_new)
     old = _ratio(sums.squares_old, sums.freedom_pairs)
     covariance = np.clip(_ratio(sums.products, sums.freedom_pairs), 0, np.sqrt(v * old))
-    correlated = np.where(old > 0, covariance**2 / np.maximum(old, 1e-300), 0.0)
-    measured = np.maximum(v - correlated, 0)
+    covered = np.where(old > 0, covariance**2 / np.maximum(old, 1e-300), 0.0)
+    measured = np.maximum(v - covered, 0)
     # One pair in each pixel tells half of what two would.
     of_differences = np.minimum(0.5 * pairs, 1.0)
     known = freedom + of_differences
-    own = _ratio(measured * freedom + _ratio(sums.differences, sums.pairs) * of_differences, known)
+    differences = _ratio(sums.differences, sums.pairs)
+    own = _ratio(measured * freedom + differences * of_differences, known)
+    unchanged = np.maximum(_ratio(sums.squares_kept, sums.pairs) - differences, 0)
+    correlated = _ratio(covered * freedom + unchanged * of_differences, known)
     believed = np.minimum(known, 1.0)
     around = _ratio(_smoothed(own * believed, columns), _smoothed(believed, columns))
     uncorrelated = (own * known + around * NEIGHBOURS_WEIGHT) / (known + NEIGHBOURS_WEIGHT)
     touched = np.where(sums.samples > 0, _ratio(sums.touched, sums.samples), _UNKNOWN_TOUCHED)
     singles = (sums.freedom_new > 0) & (v < uncorrelated * (1 + touched)) & (pairs >= PAIRS_FIRST)
     uncorrelated = np.where(singles, v, uncorrelated)
+    # Noise that shrinkage does not show need not be sampled away.
+    shown = np.where(sums.noise > 0, SHOWN_TWICE * _ratio(sums.shown_noise, sums.noise), 1)
+    uncorrelated = uncorrelated * np.clip(shown, LEAST_SHOWN, 1)
     least = LEAST_SHARE * max(float(uncorrelated.mean()), 1e-30)
     return TileVariances(
         uncorrelated=np.maximum(uncorrelated, least),

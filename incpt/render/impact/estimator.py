@@ -40,7 +40,10 @@ class Estimator:
 
     def update(self, film: Film, seen: SeenPair) -> None:
         """Make the picture of what the film has of pairs."""
-        self._measure(film, seen)
+        if seen is not self._seen:
+            self.guides.set(seen.labels, seen.normals, seen.changed)
+            self._seen = seen
+        self.statistics.update(film, self.guides)
         self.shrinkage.update(film, self.guides, self.statistics)
 
     def image(self, film: Film, seen: SeenPair) -> Float32Array:
@@ -55,8 +58,8 @@ class Estimator:
 
     def tile_sums(self, film: Film, seen: SeenPair, grid: TileGrid) -> TileSums:
         """What the film has of pairs, tile by tile. It waits for the device."""
-        self._measure(film, seen)
-        return self.statistics.tile_sums(film, self.guides, grid)
+        self.update(film, seen)
+        return self.statistics.tile_sums(film, self.guides, grid, self.shrinkage.shown)
 
     def idle_launches(self, film: Film) -> list[Callable[[], None]]:
         """The launches of all kernels, with nothing to do; see `Device.built`."""
@@ -65,9 +68,3 @@ class Estimator:
             *self.statistics.idle_launches(film, self.guides),
             *self.shrinkage.idle_launches(film, self.guides, self.statistics),
         ]
-
-    def _measure(self, film: Film, seen: SeenPair) -> None:
-        if seen is not self._seen:
-            self.guides.set(seen.labels, seen.normals, seen.changed)
-            self._seen = seen
-        self.statistics.update(film, self.guides)

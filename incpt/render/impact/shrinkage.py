@@ -34,6 +34,9 @@ class Shrinkage:
         pixels = width * height
         self.image_buffer = self._touched(16 * pixels)
         """The picture as of the last `update`: red, green, blue and 1, or 0 where there is no sample."""
+        self.shown = {"shown_image": self.image_buffer, "shown_shares": device.empty(4 * pixels)}
+        """Kernel arguments: that picture, and how much of the noise of its change each pixel near one shows
+        there."""
         self._halves = tuple(self._field(len(layout.HalfPlane)) for _ in range(2))
         self._planes = {
             "details": self._touched(4 * 3 * _DETAILS * pixels),
@@ -88,7 +91,7 @@ class Shrinkage:
             "cells": statistics.cells,
             "column_rules": statistics.column_rules,
             "spans": statistics.spans,
-            "shown_image": self.image_buffer,
+            **self.shown,
         }
 
     def _run(self, patches: Patches, values: Mapping[str, Any]) -> None:

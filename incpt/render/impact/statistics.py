@@ -56,19 +56,24 @@ class Statistics:
         """Take in what the film has of pairs."""
         self._pool(self.patches, self._values(film, guides))
 
-    def tile_sums(self, film: Film, guides: Guides, grid: TileGrid) -> TileSums:
+    def tile_sums(
+        self, film: Film, guides: Guides, grid: TileGrid, shrunk: Mapping[str, cl.Buffer]
+    ) -> TileSums:
         """Sums over the tiles of a grid over the picture, from what the film has; variances of the picture
-        are those of the last `update`. It waits for the device."""
+        are those of the last `update`, and `shrunk` is what shrinkage says of it. It waits for the
+        device."""
         device, rows = self.patches.device, grid.rows * len(layout.TileSum)
         columns, sums = device.empty(4 * rows * grid.width), device.empty(4 * rows * grid.columns)
-        self._sum_columns(self.patches, grid, self._values(film, guides) | {"columns": columns}, sums)
+        values = {**self._values(film, guides), **shrunk, "columns": columns}
+        self._sum_columns(self.patches, grid, values, sums)
         found = device.read(sums, np.empty((len(layout.TileSum), grid.count), np.float32))
         named = {one.name.lower(): found[one].astype(np.float64) for one in layout.TileSum}
         return TileSums(pixels=_tile_pixels(grid), **named)
 
     def idle_launches(self, film: Film, guides: Guides) -> list[Callable[[], None]]:
         """The launches of all kernels, with nothing to do; see `Device.built`."""
-        values, nothing = self._values(film, guides) | {"columns": self._cell_sums}, self.patches.nothing
+        scratch = dict.fromkeys(("columns", "shown_image", "shown_shares"), self._cell_sums)
+        values, nothing = self._values(film, guides) | scratch, self.patches.nothing
         grid = TileGrid(1, 0, 1)
         # Sums of tiles may be so many that PoCL's grid is a large one.
         return [

@@ -14,6 +14,8 @@ from incpt.render.impact.guides import Guides
 from incpt.render.impact.shrinkage import Shrinkage
 from incpt.render.impact.statistics import Statistics
 from incpt.render.impact.sums import PAIR_SUMS
+from incpt.render.impact.tile_sums import TileSums
+from incpt.render.tiles import TileGrid
 
 Array = npt.NDArray[np.float64]
 KEPT = 64.0
@@ -84,6 +86,11 @@ class Rig:
         self.statistics.update(self.film, self.guides)
         self.shrinkage.update(self.film, self.guides, self.statistics)
         return self.shrinkage.image()[..., :3].astype(np.float64)
+
+    def tile_sums(self, grid: TileGrid) -> TileSums:
+        """Of the film, with the picture that it makes."""
+        self.picture()
+        return self.statistics.tile_sums(self.film, self.guides, grid, self.shrinkage.shown)
 
     def fold(self) -> None:
         self.shrinkage.fold(self.film, self.guides, self.statistics)

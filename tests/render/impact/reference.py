@@ -162,8 +162,29 @@ def spread_of(state: State) -> Spread:
 
 
 @dataclass
+class PairSpread:
+    """(H, W) degrees of freedom, and sums of squares and products of deviations from the means of pixels."""
+
+    freedom: Array
+    squares_old: Array
+    products: Array
+
+
+def pair_spread_of(state: State) -> PairSpread:
+    samples, pairs = state.samples.sum(0), state.pairs.sum(0)
+    x, y = state.new.sum(0), state.old.sum(0)
+    spreads = pairs >= 2
+    squares_old = state.old_moment - (y * y).mean(-1) / np.maximum(pairs, 1)
+    products = state.joint_moment - (x * y).mean(-1) / np.maximum(samples, 1)
+    # Of the mean of all samples less goes with the old values than of that of the pairs.
+    products *= (1 - 1 / np.maximum(pairs, 2)) / (1 - 1 / np.maximum(samples, 2))
+    return PairSpread(*(np.where(spreads, values, 0) for values in (pairs - 1, squares_old, products)))
+
+
+@dataclass
 class Known:
-    """(rows, columns) of cells: what the pixels of one class in and around each tell: layout.CellPlane."""
+    """(rows, columns) of cells: what the pixels of one class in and around each tell: layout.CellPlane, and
+    the old variance and the covariance from the means of pixels."""
 
     new_variance: Array
     old_variance: Array
@@ -172,20 +193,23 @@ class Known:
     freedom_new: Array
     pairs: Array
     touched: Array
+    pair_squares_old: Array
+    pair_products: Array
 
 
 def known(state: State, changed: npt.NDArray[np.bool_], enough: float = 300) -> list[Known]:
     """For pixels that did not change, and for those that did."""
     spread, result = spread_of(state), []
     terms = [state.samples.sum(0), spread.pairs, spread.freedom_new, spread.squares_new, state.new_moment]
-    terms += [spread.squares_old, spread.products, state.touched]
+    terms += [spread.squares_old, spread.products, state.touched, *vars(pair_spread_of(state)).values()]
     for class_of_pixels in (False, True):
         cells = np.stack([cell_sums(term * (changed == class_of_pixels)) for term in terms])
         wide = sums_around(cells, 2)
         if not class_of_pixels:
             near = sums_around(cells, 1)
             wide = np.where(cells[0] >= enough, cells, np.where(near[0] >= enough, near, wide))
-        samples, pairs, freedom, squares_new, new_moment, squares_old, products, touched = wide
+        samples, pairs, freedom, squares_new, new_moment, squares_old, products, touched = wide[:8]
+        freedom_pairs, pair_squares_old, pair_products = wide[8:]
         per_pair = 1 / np.maximum(pairs, 1)
         result.append(
             Known(
@@ -196,6 +220,8 @@ def known(state: State, changed: npt.NDArray[np.bool_], enough: float = 300) -> 
                 freedom,
                 pairs,
                 touched,
+                pair_squares_old / np.maximum(freedom_pairs, 1),
+                pair_products / np.maximum(freedom_pairs, 1),
             )
         )
     return result
@@ -257,7 +283,7 @@ def rules(about: list[Known]) -> list[Rule]:
                 resemblance if i else np.ones_like(weight),
                 share * one.new_variance + i * (1 - share) * one.new_moment,
                 (1 - i) * 0.5 * (1 - share),
-                share * (2 * one.covariance - weight * one.old_variance),
+                share * (2 * one.pair_products - weight * one.pair_squares_old),
             )
         )
     return result
@@ -310,23 +336,43 @@ def shown_variance(state: State, about: list[Known], changed: npt.NDArray[np.boo
     return np.where(touched_around(about, changed), of_change, refined)
 
 
+def change_variance(state: State, about: list[Known], changed: npt.NDArray[np.bool_]) -> Array:
+    rule = rule_of_pixels(about, changed, interpolated=False)
+    return np.where(touched_around(about, changed), sample_variance(state, rule), 0)
+
+
 def picture(state: State, guides: Guides) -> Array:
     """(H, W, 3) what is shown."""
+    return picture_and_shares(state, guides)[0]
+
+
+def picture_and_shares(state: State, guides: Guides) -> tuple[Array, Array]:
+    """(H, W, 3) what is shown, and (H, W) which share of the noise of the change that shows."""
     about = known(state, guides.changed)
     rule = rule_of_pixels(about, guides.changed)
     touched = touched_around(about, guides.changed)[..., None]
     refined = state.anchor + refinement(state)
     base = np.where(touched, rule.base_share[..., None], 1) * refined
     change = np.where(touched, changes(state, pair_weight(state, rule), base), 0)
-    return base + shrunk(change, state.samples, sample_variance(state, rule), guides)
+    shown, shares = shrunk(change, state.samples, sample_variance(state, rule), guides)
+    return base + shown, shares
 
 
-def shrunk(change: Array, samples: Array, variance: Array, guides: Guides) -> Array:
-    """What is shown of a change (2, H, W, 3) that halves with so many samples (2, H, W) show."""
+def shrunk(change: Array, samples: Array, variance: Array, guides: Guides) -> tuple[Array, Array]:
+    """What is shown of a change (2, H, W, 3) that halves with so many samples (2, H, W) show, and which share
+    of its noise."""
     both = (samples > 0).all(0)
     apart = ((change[0] - change[1]) ** 2).mean(-1) * samples.sum(0) / 4
     weights = samples / (np.maximum(variance, np.where(both, 0.05 * apart, 0)) + 1e-7)
-    total = np.zeros(change.shape[1:])
+    total, shares = np.zeros(change.shape[1:]), np.zeros(change.shape[1:3])
+    # White noise in one pixel spreads over a binomial kernel with each pass; squares of it add up.
+    kernel, left = np.ones(1), [1.0]
+    for scale in range(SMOOTHING_SCALES):
+        wider = np.zeros(2 ** (scale + 1) + 1)
+        wider[:: 2**scale] = 0.25, 0.5, 0.25
+        kernel = np.convolve(kernel, wider)
+        left.append((kernel**2).sum() ** 2)
+    noise = -np.diff([*left, 0.0])
     for scale in range(SMOOTHING_SCALES + 1):
         if scale < SMOOTHING_SCALES:
             coarse_weights = np.stack([guides.smoothed(w[..., None], scale)[..., 0] for w in weights])
@@ -340,12 +386,17 @@ def shrunk(change: Array, samples: Array, variance: Array, guides: Guides) -> Ar
         else:
             details, coarse, coarse_weights = change, change, weights
         details = np.where((weights > 0)[..., None], details, 0)
-        total += shown_of_detail(details, weights, samples.sum(0), scale, guides)
+        mean, share = shown_of_detail(details, weights, samples.sum(0), scale, guides)
+        total += share[..., None] * mean
+        shares += noise[scale] * share
         change, weights = coarse, coarse_weights
-    return total
+    return total, shares
 
 
-def shown_of_detail(details: Array, weights: Array, samples: Array, scale: int, guides: Guides) -> Array:
+def shown_of_detail(
+    details: Array, weights: Array, samples: Array, scale: int, guides: Guides
+) -> tuple[Array, Array]:
+    """(H, W, 3) a detail as both halves show it, and (H, W) the share of it that is shown."""
     both, weight = (weights > 0).all(0), weights.sum(0)
     parts = weights / np.maximum(weight, 1e-300)
     mean = (parts[..., None] * details).sum(0)
@@ -362,7 +413,7 @@ def shown_of_detail(details: Array, weights: Array, samples: Array, scale: int, 
         strength, noisy = np.moveaxis(around, -1, 0) + 32 / np.maximum(samples, 1) * np.stack(of_cells)
     strength = np.maximum(strength, 0)
     share = np.where(strength > 0, strength / np.maximum(strength + noisy, 1e-300), 0)
-    return np.where(both if scale == 0 else weight > 0, share, 0)[..., None] * mean
+    return np.where(both if scale == 0 else weight > 0, 1.0, 0.0)[..., None] * mean, share
 
 
 def tent(cells: Array) -> Array:

@@ -10,14 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from incpt.render.impact.allocation import LEAST_SHARE, TileVariances, allocate, variances, worth
+from incpt.render.impact.allocation import LEAST_SHARE, LEAST_SHOWN, TileVariances, allocate, variances, worth
 from incpt.render.impact.tile_sums import TileSums
 
 PIXELS = 64.0
 
 
-def measured(v: float, rho: float, spp: float, kept: float = 100.0, touched: float = 0.5) -> dict[str, float]:
-    """The sums of one tile whose paths have the variance v in both scenes and correlation rho."""
+def measured(
+    v: float, rho: float, spp: float, kept: float = 100.0, touched: float = 0.5, shown: float = 1.0
+) -> dict[str, float]:
+    """The sums of one tile whose paths have the variance v in both scenes and correlation rho; of the noise
+    of the change the share `shown` shows."""
     freedom = PIXELS * max(spp - 1, 0)
     return {
         "pixels": PIXELS,
@@ -30,8 +33,11 @@ def measured(v: float, rho: float, spp: float, kept: float = 100.0, touched: flo
         "squares_new": v * freedom,
         "squares_old": v * freedom,
         "products": rho * v * freedom,
+        "squares_kept": v * PIXELS * spp,
         "differences": 2 * v * (1 - rho) * PIXELS * spp,
         "error": 0.0,
+        "noise": v * (1 - rho**2) * PIXELS,
+        "shown_noise": v * (1 - rho**2) * PIXELS * shown,
     }
 
 
@@ -65,6 +71,13 @@ def test_what_is_correlated_is_refined_only_beside_what_the_old_picture_knows() 
     assert many[1] > 0.3 * many[0]
 
 
+def test_one_pair_in_each_pixel_tells_what_is_worth_refining() -> None:
+    once, often, changed = apart(
+        measured(1.0, 1.0, 1), measured(1.0, 1.0, 9), measured(1.0, 0.0, 1)
+    ).correlated
+    assert once == pytest.approx(often, rel=0.5) and changed < 0.1 * once
+
+
 def test_partners_only_where_they_pay() -> None:
     # At rho = 0.3 a pair is worth 1.1 samples, and here costs two.
     pays = variances(sums_of(measured(1.0, 0.9, 4)), 1)
@@ -73,6 +86,15 @@ def test_partners_only_where_they_pay() -> None:
     assert [bool(t.singles[0]) for t in (pays, too_dear, too_early)] == [False, True, False]
     assert too_dear.cost[0] == 1 and too_dear.correlated[0] == 0
     assert pays.cost[0] == pytest.approx(1.5)
+
+
+def test_noise_that_is_not_shown_is_not_sampled_away() -> None:
+    tiles = apart(*(measured(1.0, 0.5, 4, shown=shown) for shown in (1.0, 0.6, 0.1, 0.0)))
+    whole = tiles.uncorrelated[0]
+    np.testing.assert_allclose(tiles.uncorrelated / whole, [1, 1, 0.2, LEAST_SHOWN], rtol=1e-2)
+    # What nobody knows of counts in full.
+    unknown = measured(1.0, 0.5, 4) | {"noise": 0.0, "shown_noise": 0.0}
+    assert apart(unknown).uncorrelated == pytest.approx(whole)
 
 
 def test_one_sample_in_each_pixel_tells_by_the_differences_of_pairs() -> None:

@@ -320,7 +320,7 @@ def test_groups_of_work_items_make_the_same_picture(
     rig.load(state, edit.guides)
     np.testing.assert_allclose(rig.picture(), reference.picture(state, edit.guides), atol=1e-4)
     grid = TileGrid(*size, 16)
-    sums = rig.statistics.tile_sums(rig.film, rig.guides, grid)
+    sums = rig.tile_sums(grid)
     samples = np.bincount(grid.tile_of_pixels().ravel(), state.samples.sum(0).ravel(), grid.count)
     np.testing.assert_array_equal(sums.samples, samples)
     rig.fold()

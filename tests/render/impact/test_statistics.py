@@ -10,6 +10,7 @@ from render.impact.made_up import Rig
 from incpt.core.layout import CELL_SIZE, CLASSES, PATCH_WIDTH, CellPlane, RulePlane
 from incpt.device.device import Device
 from incpt.picture.tone_mapping import display_values
+from incpt.render.impact import allocation
 from incpt.render.impact.statistics import squared_slopes
 from incpt.render.tiles import TileGrid
 
@@ -119,14 +120,49 @@ def test_variances_and_covariance_are_right_on_average(pairs: int, singles: int,
     assert (np.abs(mean - expected) <= 4 * error).all(), (mean, error)
 
 
+@pytest.mark.parametrize(("pairs", "singles"), [(2, 0), (3, 2), (2, 5)])
+def test_spreads_of_pairs_are_right_on_average(pairs: int, singles: int) -> None:
+    rng, spreads, count = np.random.default_rng(4), [], 40
+    for _ in range(count):
+        state = reference.State.empty(np.full((32, 32, 3), 0.4), 1)
+        for index in range(pairs + singles):
+            common = rng.normal(size=(32, 32, 3))
+            new = 1 + 0.8 * common + 0.5 * rng.normal(size=common.shape)
+            state.add(index, new, 0.7 + common, np.ones((32, 32), bool), single=index >= pairs)
+        spread = reference.pair_spread_of(state)
+        spreads.append([spread.squares_old.sum(), spread.products.sum()] / spread.freedom.sum())
+    mean, error = np.mean(spreads, 0), np.std(spreads, 0) / np.sqrt(count)
+    assert (np.abs(mean - [1, 0.8]) <= 4 * error).all(), (mean, error)
+
+
+def test_tiles_know_that_pairs_bring_the_same_from_two_samples_on(rig: Rig) -> None:
+    """However few they are, and however far the old picture is from what they say."""
+    rng = np.random.default_rng(5)
+    edit = made_up.edit(WIDTH, HEIGHT, rng)
+    state = edit.state(rng)
+    for index in range(2):
+        new, _, touched = edit.samples(rng)
+        state.add(index, new, new, touched)
+    update(rig, edit, state)
+    grid = TileGrid(WIDTH, HEIGHT, 8)
+    sums = rig.tile_sums(grid)
+    np.testing.assert_allclose(sums.squares_old, sums.squares_new, rtol=1e-4)
+    np.testing.assert_allclose(sums.products, sums.squares_new, rtol=1e-4)
+    found = allocation.variances(sums, grid.columns)
+    assert found.uncorrelated.max() < 1e-3 * found.correlated.mean()
+
+
 @pytest.mark.parametrize("tile_size", [1, 5, 8, 16, 33, 1024])
 def test_tile_sums(rig: Rig, tile_size: int) -> None:
     edit, state = sampled(3, 2)
     update(rig, edit, state)
     grid = TileGrid(WIDTH, HEIGHT, tile_size)
-    sums = rig.statistics.tile_sums(rig.film, rig.guides, grid)
+    sums = rig.tile_sums(grid)
     spread, about = reference.spread_of(state), reference.known(state, edit.guides.changed)
-    weight = slope_weight(state.anchor.mean(-1))
+    pair_spread = reference.pair_spread_of(state)
+    shown, shares = reference.picture_and_shares(state, edit.guides)
+    weight = slope_weight(shown.mean(-1))
+    change = reference.change_variance(state, about, edit.guides.changed)
     samples, pairs = state.samples.sum(0), state.pairs.sum(0)
     among_pairs = state.new_moment * pairs / np.maximum(samples, 1)
     expected = {
@@ -136,12 +172,15 @@ def test_tile_sums(rig: Rig, tile_size: int) -> None:
         "touched": state.touched,
         "kept": state.kept,
         "freedom_new": spread.freedom_new,
-        "freedom_pairs": spread.pairs,
+        "freedom_pairs": pair_spread.freedom,
         "squares_new": weight * spread.squares_new,
-        "squares_old": weight * spread.squares_old,
-        "products": weight * spread.products,
+        "squares_old": weight * pair_spread.squares_old,
+        "products": weight * pair_spread.products,
+        "squares_kept": weight * spread.squares_old,
         "differences": weight * np.maximum(among_pairs + state.old_moment - 2 * state.joint_moment, 0),
         "error": weight * reference.shown_variance(state, about, edit.guides.changed),
+        "noise": weight * change,
+        "shown_noise": weight * change * shares,
     }
     tiles = grid.tile_of_pixels().ravel()
     for name, values in expected.items():
@@ -171,7 +210,7 @@ def test_weights_of_black_and_of_glaring_pixels(rig: Rig, radiance: float) -> No
     state.anchor[:], state.touched[:] = radiance, 1
     state.samples[:], state.pairs[:], state.new_moment[:] = 0.5, 0.5, 2.0
     update(rig, edit, state)
-    sums = rig.statistics.tile_sums(rig.film, rig.guides, TileGrid(WIDTH, HEIGHT, 16))
+    sums = rig.tile_sums(TileGrid(WIDTH, HEIGHT, 16))
     weight = sums.differences[0] / (2.0 * 256)
     expected = (
         squared_slopes()[0 if radiance < 1e-3 else -1] if radiance != 0.5 else slope_weight(np.float64(0.5))
