@@ -115,6 +115,8 @@ class Film:
         planes: tuple[FilmPlanes, ...] = (),
     ) -> None:
         self.device, self.width, self.height, self.passes = device, width, height, passes
+        self.revision = 0
+        """Another number whenever sums changed, so that what was made of them need not be made twice."""
         self._nonfinite = device.empty(4)
         device.fill(self._nonfinite, 0, 4)
         first_planes = accumulate((one.channels for one in passes), initial=0)
@@ -143,7 +145,12 @@ class Film:
 
     def clear(self, planes: FilmPlanes) -> None:
         """Make the planes 0."""
+        self.note_change()
         self.device.fill(self._planes[planes], 0, self._size(planes))
+
+    def note_change(self) -> None:
+        """Who writes into the film by kernels of its own has to tell."""
+        self.revision += 1
 
     def radiance_sums(self) -> cl.Buffer:
         """The sums of red, green and blue, and the number of samples: four planes."""
@@ -164,6 +171,7 @@ class Film:
         groups = np.unique(whole_tiles["group_first"]).astype(np.uint32)
         if len(groups) == 0:
             return
+        self.note_change()
         size = len(groups) * int(params["tile_size"]) ** 2
         values = {
             "params": params,
@@ -226,6 +234,7 @@ class Film:
     def restore(self, sums: Mapping[str, Float32Array]) -> None:
         """Make the film hold what `sums` returned of one of the same size; a pass that is not among them
         stays as it is."""
+        self.note_change()
         for name in sums.keys() & self._layers.keys():
             self.device.write(self._layers[name].sums, sums[name])
         for planes, buffer in self._planes.items():

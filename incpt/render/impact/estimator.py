@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from weakref import ref
 
 import numpy as np
 import numpy.typing as npt
@@ -37,14 +38,21 @@ class Estimator:
         self.statistics = Statistics(device, width, height)
         self.shrinkage = Shrinkage(device, width, height)
         self._seen: SeenPair | None = None
+        self._source: tuple[ref[Film], int, ref[SeenPair]] | None = None
+        """What the picture was made of."""
 
     def update(self, film: Film, seen: SeenPair) -> None:
-        """Make the picture of what the film has of pairs."""
+        """Make the picture of what the film has of pairs, unless it is there: it is looked at when a round is
+        planned and when it is shown."""
+        source = ref(film), film.revision, ref(seen)
+        if self._source == source:
+            return
         if seen is not self._seen:
             self.guides.set(seen.labels, seen.normals, seen.changed)
             self._seen = seen
         self.statistics.update(film, self.guides)
         self.shrinkage.update(film, self.guides, self.statistics)
+        self._source = source
 
     def image(self, film: Film, seen: SeenPair) -> Float32Array:
         """(H, W, 4) the picture, as `Film.image` has it. It waits for the device."""

@@ -60,6 +60,7 @@ class Shrinkage:
         """Make the picture of the last `update` the kept one of the film, with as many samples as each pixel
         is worth, and forget the pairs."""
         self.patches.launch("fold_change", "fold_change", self._values(film, guides, statistics))
+        film.note_change()
         film.clear(PAIR_SUMS)
 
     def idle_launches(self, film: Film, guides: Guides, statistics: Statistics) -> list[Callable[[], None]]:

@@ -52,6 +52,7 @@ def reduce_pairs(film: Film, batch: Batch, slots: npt.NDArray[np.void], old: Old
     distance of pixels, one of which has a path for a pixel, may hold it twice.
     """
     tile_size = int(batch.params["tile_size"])
+    film.note_change()
     # Slots of one distance never share a pixel, so that work-items of one launch don't write to one place.
     for step in np.unique(slots["pixel_step"]):
         groups = np.unique(slots["group_first"][slots["pixel_step"] == step]).astype(np.uint32)

@@ -10,6 +10,7 @@ import pytest
 from support.small_scenes import mixed_scene
 
 from incpt.device.device import Device
+from incpt.render.impact.shrinkage import Shrinkage
 from incpt.render.modes import Mode
 from incpt.render.session import Session
 from incpt.scene.model import Scene
@@ -172,3 +173,24 @@ def test_an_edit_without_anything_to_see_changes_nothing(device: Device) -> None
     )
     assert session.progress is progress
     np.testing.assert_allclose(session.image(), shown, rtol=1e-5, atol=1e-6)
+
+
+def test_a_picture_is_made_once_for_who_plans_and_who_looks(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, update = [], Shrinkage.update
+
+    def counted(self: Shrinkage, *of: object) -> None:
+        made.append(1)
+        update(self, *of)
+
+    monkeypatch.setattr(Shrinkage, "update", counted)
+    session = Session(impact_scene(), size=SIZE, device=device)
+    session.render(16)
+    session.edit(moved(session.scene, 0.4))
+    first = stepped(session, 8).image()
+    assert 0 < len(made) <= 9
+    made.clear()
+    np.testing.assert_array_equal(session.image(), first)
+    assert not made
+    assert (stepped(session, 8).image() != first).any() and made
