@@ -8,8 +8,9 @@ share u, of which a tile has m samples where it had n0. The error that is left o
 
 and `Findings.error_left` is its root over that of a single sample a pixel, u, both summed up over the
 picture. Shrinkage is not in it, so that it rather says too much than too little: the picture that is shown
-is better. Over four edits (a cube and a ball moved, a colour, a lamp) of a kept picture of 256 samples it fell
-with the measured share of visible error, from 0.25, 0.89, 0.74 and 1.0 where 0.07, 0.11, 0.27 and 0.29 were left.
+is better. Over four edits (a cube and a ball moved, a colour, a lamp) of a kept picture of 256 samples it
+fell with the measured share of visible error, as where 0.25, 0.89, 0.74 and 1.0 were told and 0.07, 0.11,
+0.27 and 0.29 left.
 """
 
 from __future__ import annotations
