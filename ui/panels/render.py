@@ -34,7 +34,7 @@ _FOUND_TIP = (
     "What is left is the error of the change that the eye can see. At 100 % the picture is as good as before "
     "the edit"
 )
-_ADAPTS_TIP = "NoR is the most: tiles are repeated as often as the rest of the picture was, and the object comes at once"
+_ADAPTS_TIP = "NoR is the most: tiles get what the rest of the picture has, and the object's come at once"
 _WITHOUT_NOR = "The strategy that is chosen repeats no tiles"
 _TILE_SIZES = (8, 16, 32, 64, 128)
 """Tile sizes that are offered, in pixels."""

@@ -112,5 +112,7 @@ def test_five_edits_in_a_row_leave_nothing_behind(scene: Scene, device: Device) 
     old_places = (shows(scene, names, device) | shows(third, names, device)) & ~shows(first, names, device)
     errors = Truth.of(first, device).errors(session.image())
     left, rest = errors[old_places], errors[~old_places]
-    for share, most in ((0.5, 1.3), (0.9, 1.4), (0.99, 2.0)):
+    # A ghost would be five times the noise of the rest. What is shown there is as noisy as what was drawn
+    # since, three samples a pixel, and the rest is a picture of sixteen.
+    for share, most in ((0.5, 1.8), (0.9, 1.8), (0.99, 2.0)):
         assert np.quantile(left, share) < most * np.quantile(rest, share)
