@@ -178,6 +178,28 @@ INLINE float8 bvh_edge(const float8 ax, const float8 ay, const float8 bx, const 
     return ax * by - ay * bx;
 }
 
+// Which triangles of a pack the ray may meet though it starts between the first and the last of their
+// corners.
+//
+// The distance of a hit is a mean of those of the corners, which are far apart where a triangle is large:
+// near the ray's origin its sign is left to rounding errors. The side of the triangle on which the origin
+// lies is known far better, and for a triangle in a plane of the axes to the bit. So a ray that leaves a
+// surface never meets it again, however close to it it starts. `seen` is the determinant, whose sign tells
+// from which side the ray comes.
+INLINE int8 bvh_starts_before(const BvhRay *ray, __global const TrianglePack *pack, const float8 seen) {
+    const size_t x = ray->axis[0], y = ray->axis[1], z = ray->axis[2];
+    const float8 ax = BVH_VERTEX(pack, 0, x), ay = BVH_VERTEX(pack, 0, y), az = BVH_VERTEX(pack, 0, z);
+    const float8 bx = BVH_VERTEX(pack, 1, x) - ax, by = BVH_VERTEX(pack, 1, y) - ay,
+                 bz = BVH_VERTEX(pack, 1, z) - az;
+    const float8 cx = BVH_VERTEX(pack, 2, x) - ax, cy = BVH_VERTEX(pack, 2, y) - ay,
+                 cz = BVH_VERTEX(pack, 2, z) - az;
+    const float8 side = (by * cz - bz * cy) * (ax - ray->origin[0]) +
+                        (bz * cx - bx * cz) * (ay - ray->origin[1]) +
+                        (bx * cy - by * cx) * (az - ray->origin[2]);
+    const int8 differs = as_int8(side) ^ as_int8(seen * ray->shear[2]);
+    return (differs < 0) & (side != 0.0f);
+}
+
 // Which triangles of a pack the ray meets at 0 < t < limit, their t, and the weights of their corners.
 INLINE uint bvh_triangles(const BvhRay *ray, __global const TrianglePack *pack, float limit, float8 *distance,
                           float8 *weight) {
@@ -198,9 +220,10 @@ INLINE uint bvh_triangles(const BvhRay *ray, __global const TrianglePack *pack, 
     // t = depth / determinant, compared without the division. A determinant of 0 fails one of the
     // comparisons.
     const float8 size = as_float8(as_int8(determinant) ^ sign), scaled = as_float8(as_int8(depth) ^ sign);
-    const uint lanes =
+    uint lanes =
         bvh_lanes(((lowest >= 0.0f) | (highest <= 0.0f)) & (scaled > 0.0f) & (scaled < size * limit));
     if (lanes) {
+        lanes &= bvh_lanes(bvh_starts_before(ray, pack, determinant));
         *distance = depth / determinant;
         weight[0] = u;
         weight[1] = v;

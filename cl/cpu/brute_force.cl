@@ -58,6 +58,9 @@ typedef struct {
 // Tests the rays against a quad, a parallelogram or a triangle. The weights of the corners A, B and C are
 // kept; in the half ACD of a parallelogram that of B is negative. With `any` only the fact that something is
 // met is kept.
+//
+// The distance follows from how far the ray starts from the plane, and not from the distances of the corners:
+// near a large quad its sign would be left to rounding errors; see bvh_starts_before.
 INLINE void test_quad(RayGroup *group, __global const Quad *quad, uint index, const uint *axes,
                       const bool triangle, const bool any) {
     LaneCorner corner[4];
@@ -67,6 +70,10 @@ INLINE void test_quad(RayGroup *group, __global const Quad *quad, uint index, co
         corner[i] =
             lane_corner(vertex[axes[0]], vertex[axes[1]], vertex[axes[2]], group->origin, group->shear);
     }
+    float16 height = 0.0f;
+#pragma unroll
+    for (uint i = 0; i < 3; i++)
+        height += quad->normal[axes[i]] * (quad->vertex[axes[i]] - group->origin[i]);
     const float16 weight[3] = {lane_edge(corner + 1, corner + 2), lane_edge(corner + 2, corner),
                                lane_edge(corner, corner + 1)};
     float16 lowest = BVH_MIN8(weight[0], weight[2]), highest = BVH_MAX8(weight[0], weight[2]);
@@ -80,7 +87,7 @@ INLINE void test_quad(RayGroup *group, __global const Quad *quad, uint index, co
     }
     // The division comes before the comparison, so that only the comparison has to wait for the limit that
     // the quad before has left. A determinant of 0 fails one of the comparisons.
-    const float16 distance = lane_distance(corner, weight, group->shear[2]);
+    const float16 distance = height * group->shear[2] / (weight[0] + weight[1] + weight[2]);
     const int16 met = ((lowest >= 0.0f) | (highest <= 0.0f)) & (distance > 0.0f) & (distance < group->limit);
     group->place = met ? (uint16)(index) : group->place;
     if (!any)
@@ -91,20 +98,25 @@ INLINE void test_quad(RayGroup *group, __global const Quad *quad, uint index, co
 // coordinates. Rays that start inside meet the side where they leave.
 INLINE void test_parallelepiped(RayGroup *group, __global const Parallelepiped *parallelepiped,
                                 const uint *axes, const bool any) {
-    float16 away[3], start[3], step[3], entry[3], exit[3];
+    float16 away[3], left[3], start[3], step[3], entry[3], exit[3];
 #pragma unroll
-    for (uint i = 0; i < 3; i++)
+    for (uint i = 0; i < 3; i++) {
         away[i] = group->origin[i] - parallelepiped->corner[axes[i]];
+        left[i] = parallelepiped->opposite[axes[i]] - group->origin[i];
+    }
 #pragma unroll
     for (uint k = 0; k < 3; k++) {
         __global const float *row = parallelepiped->local_from_world + 3 * k;
         start[k] = row[axes[0]] * away[0] + row[axes[1]] * away[1] + row[axes[2]] * away[2];
+        // What is left up to 1, from the corner that lies there, so that rounding errors near that side do
+        // not grow with the size of the whole.
+        const float16 end = row[axes[0]] * left[0] + row[axes[1]] * left[1] + row[axes[2]] * left[2];
         step[k] = row[axes[0]] * group->direction[0] + row[axes[1]] * group->direction[1] +
                   row[axes[2]] * group->direction[2];
         // Both are products, because a ray along a side has an infinite `inverse`, from which a sum would
         // make NaN.
         const float16 inverse = 1.0f / step[k];
-        const float16 first = -start[k] * inverse, second = (1.0f - start[k]) * inverse;
+        const float16 first = -start[k] * inverse, second = end * inverse;
         entry[k] = BVH_MIN8(first, second);
         exit[k] = BVH_MAX8(first, second);
     }

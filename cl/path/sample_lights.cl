@@ -7,14 +7,13 @@
 // and because PoCL vectorises small kernels that it would not vectorise as parts of a large one.
 INLINE void sample_lights_path(const Params *params, const Emitters *emitters, const State *state,
                                uint path) {
-    Vec3 position = load_surface(state, path).position;
+    Surface surface = load_surface(state, path);
     Path p = load_path(state, path);
     uint seed = pixel_seed(p.pixel, params->seed);
     Uniform2 uv = uniform_2d(seed, p.sample, PAIR_LIGHT(p.ray));
     float choice = uniform_2d(seed, p.sample, PAIR_CHOICE(p.ray)).v;
-    LightSample light = sample_light(params, emitters, position, uv, choice);
-    // A little short, so that the light's own surface is not in its way.
-    light.distance = light.distance * 0.9999f;
+    Vec3 step = scale(surface.offset, surface.geometric);
+    LightSample light = sample_light(params, emitters, surface.position, step, uv, choice);
     store_light_sample(state, path, &light);
 }
 

@@ -114,9 +114,18 @@ INLINE uint light_flags(const Params *params, const Emitters *emitters, uint lig
     return ((__global const uint *)emitters->lights)[LIGHT_FLAGS * params->light_count + light];
 }
 
-// `choice` selects the triangle, `uv` the point on it.
+// Where a ray from a surface to a point starts: a step off the surface, on the side where the point lies.
+INLINE Vec3 start_towards(Vec3 point, Vec3 position, Vec3 step) {
+    float side = dot(subtract(point, position), step) < 0.0f ? -1.0f : 1.0f;
+    return along(position, side, step);
+}
+
+// `choice` selects the triangle, `uv` the point on it. Direction, distance and density are those from where
+// the shadow ray starts. It ends before the point by what rounding may put between that and the light's
+// surface, which would be in its way. That is the more the flatter the light is seen, but never so much that
+// the ray passes by what stands before the light.
 INLINE LightSample sample_triangle_light(const Params *params, const Emitters *emitters, Vec3 position,
-                                         Uniform2 uv, float choice) {
+                                         Vec3 step, Uniform2 uv, float choice) {
     uint stride = params->light_count;
     __global const float *lights = emitters->lights;
     uint light = chosen_triangle(params, emitters, choice);
@@ -127,18 +136,21 @@ INLINE LightSample sample_triangle_light(const Params *params, const Emitters *e
     Vec3 edge_2 = light_vec3(lights + LIGHT_EDGE_2_X * stride, stride, light);
     Vec3 point = add(vertex, add(scale(b1, edge_1), scale(b2, edge_2)));
     Vec3 normal = normalize(cross(edge_1, edge_2));
-    Vec3 to_light = subtract(point, position);
+    Vec3 to_light = subtract(point, start_towards(point, position, step));
     float squared = dot(to_light, to_light);
+    float distance = SQRT(squared);
     LightSample result;
-    result.distance = SQRT(squared);
-    result.direction = scale(1.0f / MAX(result.distance, 1e-30f), to_light);
+    result.direction = scale(1.0f / MAX(distance, 1e-30f), to_light);
     float cosine = -dot(normal, result.direction);
     int double_sided = (light_flags(params, emitters, light) & LIGHT_DOUBLE_SIDED) != 0u;
     int shines = double_sided | (cosine > 0.0f);
     float facing = FABS(cosine);
     int valid = shines & (facing > 1e-7f) & (squared > 0.0f);
+    float inverse_facing = 1.0f / (valid ? facing : 1.0f);
+    float slack = lights[LIGHT_SLACK * stride + light] + 0x1p-21f * distance;
+    result.distance = distance - MIN(slack * inverse_facing, 0.125f * distance);
     result.radiance = light_vec3(lights + LIGHT_EMISSION_R * stride, stride, light);
-    result.pdf = valid ? lights[LIGHT_PDF_AREA * stride + light] * squared / (valid ? facing : 1.0f) : 0.0f;
+    result.pdf = valid ? lights[LIGHT_PDF_AREA * stride + light] * squared * inverse_facing : 0.0f;
     return result;
 }
 #endif
@@ -153,13 +165,15 @@ INLINE float second_choice(const Params *params, float choice) {
 
 #ifdef LIGHT_SAMPLING
 // One direction towards a light, chosen by power among triangles and the environment.
-INLINE LightSample sample_light(const Params *params, const Emitters *emitters, Vec3 position, Uniform2 uv,
-                                float choice) {
+// `step` is how far off the surface at `position` rays start, along its normal.
+INLINE LightSample sample_light(const Params *params, const Emitters *emitters, Vec3 position, Vec3 step,
+                                Uniform2 uv, float choice) {
 #if defined(ENVIRONMENT_IMAGE) && defined(TRIANGLE_LIGHTS)
     float p = params->environment_probability;
     int far = choice < p;
     LightSample a = sample_environment(params, emitters, uv);
-    LightSample b = sample_triangle_light(params, emitters, position, uv, second_choice(params, choice));
+    LightSample b =
+        sample_triangle_light(params, emitters, position, step, uv, second_choice(params, choice));
     LightSample result;
     result.direction = select(far, a.direction, b.direction);
     result.distance = far ? a.distance : b.distance;
@@ -169,7 +183,7 @@ INLINE LightSample sample_light(const Params *params, const Emitters *emitters, 
 #elif defined(ENVIRONMENT_IMAGE)
     return sample_environment(params, emitters, uv);
 #elif defined(TRIANGLE_LIGHTS)
-    return sample_triangle_light(params, emitters, position, uv, choice);
+    return sample_triangle_light(params, emitters, position, step, uv, choice);
 #endif
 }
 #endif

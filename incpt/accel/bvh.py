@@ -27,13 +27,6 @@ LARGEST_SERIAL_RANGE = 1 << 15
 CHUNK = 1 << 12
 """Boxes that one work-item takes of such a range."""
 
-# Rounding errors of a hit in units of float32's half ulp: of its position (seven operations of interpolation
-# and three of transform, pbrt-v4 section 6.8), and of the next ray's test against the same triangle, which
-# was measured (4 do, 2 do not).
-_POSITION_ULPS = 10
-_TEST_ULPS = 8
-_HALF_ULP = 2.0**-24
-
 
 @dataclass(frozen=True, eq=False)
 class Bvh:
@@ -85,26 +78,6 @@ def refit_mesh(device: Device, bvh: Bvh, mesh: Mesh) -> Bvh:
     new_nodes = device.read(nodes, np.empty_like(bvh.nodes))
     new_packs = device.read(packs, np.empty_like(bvh.packs))
     return Bvh(new_nodes, new_packs, bvh.levels, root_bounds(new_nodes))
-
-
-def position_error(
-    bounds: npt.NDArray[np.floating[Any]],
-    world_from_object: npt.NDArray[np.float64],
-    object_from_world: npt.NDArray[np.float64],
-) -> npt.NDArray[np.float64]:
-    """(3,) how far a hit on an object may lie off its surface by rounding, along each axis, in metres.
-
-    `bounds` (2, 3) are those of the mesh in object space; the matrices are (3, 4). As in pbrt-v4 section 6.8,
-    the bound contains the interpolation of the position, its way to world space, that of the next ray's
-    origin back to object space, and the next ray's test. One bound per object instead of one per triangle:
-    the largest coordinates count, and for a hit it costs three multiplications.
-    """
-    w, m = np.abs(world_from_object), np.abs(object_from_world)
-    world = w[:, :3] @ np.abs(bounds).max(axis=0) + w[:, 3]
-    back = m[:, :3] @ world + m[:, 3]
-    extent = w[:, :3] @ (bounds[1] - bounds[0]).astype(np.float64)
-    error = _POSITION_ULPS * (world + w[:, :3] @ back) + _TEST_ULPS * extent.max()
-    return np.asarray(_HALF_ULP * error)
 
 
 def build_boxes(

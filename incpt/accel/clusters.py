@@ -23,6 +23,9 @@ objects, faces, what it takes to test all quads, and what a group of rays is exp
 
 _LEAST_HEIGHT = 2.0**-16
 """Below this height, relative to the largest coordinate, a parallelepiped is as thin as rounding errors."""
+_UNEVENNESS = 5 * 2.0**-24
+"""How far the corners of a side may be off its plane, relative to their coordinates and distances: what
+rounding makes of a parallelepiped that is turned."""
 _BOX_COST, _PARALLELEPIPED_COST = 0.4, 1.3
 """What testing a box and a parallelepiped costs, in tests of a quad (instructions counted)."""
 _RAYS = 16
@@ -69,14 +72,17 @@ def arrange(triangles: WorldTriangles, quads_of: Callable[[Mesh], Quads]) -> Bru
     ]
     vertices, without_area = triangles.vertices, triangles.without_area
     rows, groups, sides = _rows(parts, vertices, triangles.places)
-    parallelepipeds, thick = _parallelepipeds(parts, vertices)
-    # The sides of a parallelepiped that is too thin stand for themselves.
-    sides[sides] = np.repeat(thick, SIDES)
-    parallelepipeds = parallelepipeds[thick]
+    parallelepipeds, regular = _parallelepipeds(parts, vertices)
+    regular &= _are_sides_even(parallelepipeds, rows["vertex"][sides])
+    # The sides of a parallelepiped that is too thin or too uneven stand for themselves.
+    sides[sides] = np.repeat(regular, SIDES)
+    parallelepipeds = parallelepipeds[regular]
     kept = ~without_area[rows["place"] & ~np.uint32(layout.NODE_PACK)].any(axis=1) | sides
     rows, sides, group = rows[kept], sides[kept], np.unique(groups[kept], return_inverse=True)[1]
     if len(rows) == 0:
         return empty_tables()
+    rows, source = _halves(rows, sides | _are_even(rows))
+    sides, group = sides[source], group[source]
     if np.count_nonzero(~sides) + _PARALLELEPIPED_COST * len(parallelepipeds) > _MOST_TESTS:
         return None
     boxes = _boxes(rows, group, sides)
@@ -142,6 +148,7 @@ def _rows(
     )
     faces = np.concatenate([quads.faces for quads in own]) + each([p.first_face for p in parts])[:, None]
     rows["vertex"] = vertices[corners].reshape(-1, 12)
+    rows["normal"] = _normals(rows)
     rows["place"] = places[faces]
     rows["object"] = each([part.index for part in parts])
     rows["turns"] = (
@@ -164,13 +171,66 @@ def _parallelepipeds(
     corners = vertices[np.concatenate([part.quads.parallelepipeds + part.first_vertex for part in parts])]
     corners = corners.astype(np.float64)
     axes = corners[:, 1:] - corners[:, :1]
+    opposite = corners[:, 0] + axes.sum(axis=1)
     regular = np.linalg.det(axes) != 0
     axes[~regular] = np.eye(3)
     inverse = np.linalg.inv(axes).transpose(0, 2, 1)
     rows = np.zeros(len(corners), layout.PARALLELEPIPED)
-    rows["corner"], rows["local_from_world"] = corners[:, 0], inverse.reshape(-1, 9)
+    rows["corner"], rows["opposite"] = corners[:, 0], opposite
+    rows["local_from_world"] = inverse.reshape(-1, 9)
     steepest = np.sqrt((inverse**2).sum(axis=2).max(axis=1, initial=0.0))
     return rows, regular & (steepest * np.abs(vertices).max() * _LEAST_HEIGHT < 1)
+
+
+def _normals(rows: npt.NDArray[np.void]) -> npt.NDArray[np.float64]:
+    """(Q, 3) of quads, as layout.QUAD has them."""
+    a, b, c, _ = rows["vertex"].reshape(-1, 4, 3).astype(np.float64).transpose(1, 0, 2)
+    return np.asarray(np.cross(c - a, b - a))
+
+
+def _are_even(rows: npt.NDArray[np.void]) -> npt.NDArray[np.bool_]:
+    """Whether all corners of quads lie in one plane, up to what rays keep off a surface that they leave."""
+    corners, normal = rows["vertex"].reshape(-1, 4, 3).astype(np.float64), np.abs(_normals(rows))
+    away = corners - corners[:, :1]
+    off = np.abs(np.einsum("qi,qi->q", _normals(rows), away[:, 3]))
+    reach = np.abs(corners).max(axis=1) + np.abs(away).max(axis=1)
+    return np.asarray(off <= _UNEVENNESS * np.einsum("qi,qi->q", normal, reach))
+
+
+def _halves(
+    rows: npt.NDArray[np.void], whole: npt.NDArray[np.bool_]
+) -> tuple[npt.NDArray[np.void], npt.NDArray[np.intp]]:
+    """The quads, with two triangles in place of those that are not `whole`; and which quad each was."""
+    source = np.repeat(np.arange(len(rows)), np.where(whole, 1, 2))
+    second = np.diff(source, prepend=-1) == 0
+    first = np.diff(source, append=len(rows)) == 0
+    halves = rows[source]
+    vertex = halves["vertex"].reshape(-1, 4, 3)
+    vertex[second, 1] = vertex[second, 2]
+    vertex[second, 2] = vertex[second, 3]
+    vertex[first, 3] = vertex[first, 2]
+    halves["vertex"] = vertex.reshape(-1, 12)
+    halves["place"][first, 1] = halves["place"][first, 0]
+    halves["place"][second, 0] = halves["place"][second, 1]
+    turns = halves["turns"]
+    turns[second] = turns[second] >> np.uint32(layout.TURNS_SECOND.shift) & np.uint32(layout.TURNS_FIRST.mask)
+    halves["normal"] = _normals(halves)
+    return halves, source
+
+
+def _are_sides_even(
+    parallelepipeds: npt.NDArray[np.void], sides: npt.NDArray[np.float32]
+) -> npt.NDArray[np.bool_]:
+    """Whether the corners (6 P, 12) of the sides of parallelepipeds lie in the planes that kernels test, up
+    to what rays keep off a surface that they leave (cl/path/setup_surface.cl)."""
+    corners = sides.astype(np.float64).reshape(-1, 3, 2, 4, 3)  # by body, local axis, and its ends
+    ends = np.stack([parallelepipeds["corner"], parallelepipeds["opposite"]], axis=1).astype(np.float64)
+    inverse = parallelepipeds["local_from_world"].astype(np.float64).reshape(-1, 3, 3)
+    away = corners - ends[:, None, :, None]
+    off = np.abs(np.einsum("pki,pkeci->pkec", inverse, away)).max(axis=3)
+    reach = np.abs(corners).max(axis=3) + np.abs(away).max(axis=3)
+    allowed = _UNEVENNESS * np.einsum("pki,pkei->pke", np.abs(inverse), reach)
+    return np.asarray((off <= allowed).all(axis=(1, 2)))
 
 
 @dataclass(frozen=True)

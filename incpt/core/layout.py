@@ -101,9 +101,9 @@ class SurfacePlane(IntEnum):
     """Planes of the surface that a ray has met, in world space.
 
     The geometric normal follows the winding of the face; the shading normal lies on its side.
-    OFFSET bounds the rounding error of POSITION: a ray that leaves the surface starts that far
-    along the geometric normal. FACE counts in the mesh. After `intersect` OBJECT is NO_INDEX (as uint) where
-    the ray left the scene.
+    OFFSET bounds the rounding error of POSITION along the geometric normal: a ray that leaves the surface
+    starts that far along it. It is 0 where there is no such error. FACE counts in the mesh. After `intersect`
+    OBJECT is NO_INDEX (as uint) where the ray left the scene.
     """
 
     GEOMETRIC_X = 0
@@ -173,7 +173,8 @@ class LightPlane(IntEnum):
     before PoCL comes to vectorise over work-items, and those it does not vectorise over.
 
     PDF_AREA is the density of choosing the triangle and a point on it, per square metre; ALIAS (uint) and
-    ALIAS_PROBABILITY are the Walker/Vose table over the triangles; FLAGS are of LightFlag (uint).
+    ALIAS_PROBABILITY are the Walker/Vose table over the triangles; FLAGS are of LightFlag (uint). SLACK
+    bounds how far rounding takes a chosen point off the triangle as rays meet it, in metres.
     """
 
     VERTEX_X = 0
@@ -192,6 +193,7 @@ class LightPlane(IntEnum):
     ALIAS_PROBABILITY = 13
     ALIAS = 14
     FLAGS = 15
+    SLACK = 16
 
 
 class LightFlag(IntFlag):
@@ -488,6 +490,8 @@ QUAD = _packed(
         # A parallelogram or a triangle in world space: corners A, B, C, D on the way around, x, y and z of
         # each. A triangle has C in place of D.
         ("vertex", np.float32, (12,)),
+        # (C - A) x (B - A): twice the area of ABC is its length.
+        ("normal", np.float32, (3,)),
         # Places of the triangles ABC and ACD in the packs of the top level, see PLACE_PACK.
         ("place", np.uint32, (2,)),
         ("object", np.uint32),
@@ -501,6 +505,7 @@ PARALLELEPIPED = _packed(
     [
         # A parallelepiped in world space. Its local coordinates are between 0 and 1 inside.
         ("corner", np.float32, (3,)),
+        ("opposite", np.float32, (3,)),  # the corner where all local coordinates are 1
         ("local_from_world", np.float32, (9,)),  # 3 x 3, row by row, of the way from that corner
         ("first_side", np.uint32),  # of six quads: where local x is 0, where it is 1, where y is 0 ...
     ]
@@ -523,7 +528,6 @@ OBJECT = _packed(
     [
         ("object_from_world", np.float32, (12,)),  # 3 x 4, row by row
         ("world_from_object", np.float32, (12,)),
-        ("position_error", np.float32, (3,)),  # bound of a hit position's rounding error by axis, world space
         ("first_node", np.uint32),  # of its mesh in the buffer of all nodes
         ("first_pack", np.uint32),
         ("first_normal", np.uint32),  # float index of the mesh's corner normals, or NO_INDEX: flat faces

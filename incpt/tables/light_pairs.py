@@ -78,6 +78,7 @@ def paired_lights(old: Scene, new: Scene, share: float) -> tuple[TriangleLights,
                 np.where(rows.shines[i], rows.weight * scale, 0),
                 power,
                 rows.flags(i),
+                rows.errors[i],
             ),
             densities,
         )
@@ -87,10 +88,29 @@ def paired_lights(old: Scene, new: Scene, share: float) -> tuple[TriangleLights,
 
 
 @dataclass(frozen=True, eq=False)
+class _Triangles:
+    """Those of an object: `corners` (F, 3, 3) and `errors` (F, 3), see `_Rows`."""
+
+    corners: Array
+    errors: Array
+
+    @classmethod
+    def of(cls, obj: Object) -> _Triangles:
+        return cls(lights.world_corners(obj), lights.transform_errors(obj))
+
+    def __getitem__(self, chosen: npt.NDArray[np.bool_]) -> _Triangles:
+        return _Triangles(self.corners[chosen], self.errors[chosen])
+
+
+_NO_TRIANGLES = _Triangles(np.zeros((0, 3, 3)), np.zeros((0, 3)))
+
+
+@dataclass(frozen=True, eq=False)
 class _Rows:
     """N triangles, in the old and in the new scene.
 
     corners       (2, N, 3, 3); where a scene lacks it, those of the other.
+    errors        (2, N, 3) their `lights.transform_errors`.
     emission      (2, N, 3); 0 where a scene lacks it.
     double_sided  (2, N)
     weight        (N,) per area
@@ -98,6 +118,7 @@ class _Rows:
     """
 
     corners: Array
+    errors: Array
     emission: Array
     double_sided: npt.NDArray[np.bool_]
     weight: Array
@@ -105,10 +126,10 @@ class _Rows:
 
     @classmethod
     def joined(cls, parts: list[_Rows]) -> _Rows:
-        no_triangles = np.zeros((0, 3, 3))
-        every = [_row(None, None, "", no_triangles, no_triangles, 0.0), *parts]
+        every = [_row(None, None, "", _NO_TRIANGLES, _NO_TRIANGLES, 0.0), *parts]
         return cls(
             np.concatenate([part.corners for part in every], axis=1),
+            np.concatenate([part.errors for part in every], axis=1),
             np.concatenate([part.emission for part in every], axis=1),
             np.concatenate([part.double_sided for part in every], axis=1),
             np.concatenate([part.weight for part in every]),
@@ -120,6 +141,7 @@ class _Rows:
         kept = (self.area >= lights.SMALLEST_AREA) & (self.weight >= lights.SMALLEST_WEIGHT)
         return _Rows(
             self.corners[:, kept],
+            self.errors[:, kept],
             self.emission[:, kept],
             self.double_sided[:, kept],
             self.weight[kept],
@@ -155,10 +177,11 @@ def _rows(old: Scene, new: Scene, weights: Mapping[str, float]) -> list[_Rows]:
     found = []
     for key in [*before, *(key for key in after if key not in before)]:
         a, b = before.get(key), after.get(key)
-        first, second = (None if obj is None else lights.world_corners(obj) for obj in (a, b))
+        first, second = (None if obj is None else _Triangles.of(obj) for obj in (a, b))
         weight = weights[key[1]]
-        if first is not None and second is not None and len(first) == len(second):
-            same = np.isclose(lights.areas(first), lights.areas(second), rtol=_SAME_AREA, atol=0)
+        if first is not None and second is not None and len(first.corners) == len(second.corners):
+            before_it, after_it = lights.areas(first.corners), lights.areas(second.corners)
+            same = np.isclose(before_it, after_it, rtol=_SAME_AREA, atol=0)
             found.append(_row(old, new, key[1], first[same], second[same], weight))
             first, second = first[~same], second[~same]
         if first is not None:
@@ -175,17 +198,18 @@ def _seen(scene: Scene, weights: Mapping[str, float]) -> dict[tuple[str, str], O
 
 
 def _row(
-    old: Scene | None, new: Scene | None, name: str, first: Array, second: Array, weight: float
+    old: Scene | None, new: Scene | None, name: str, first: _Triangles, second: _Triangles, weight: float
 ) -> _Rows:
-    """Triangles (N, 3, 3) with the material of that name in the scenes that are given."""
-    count = len(first)
+    """Triangles with the material of that name in the scenes that are given."""
+    count = len(first.corners)
     emission, double_sided = np.zeros((2, count, 3)), np.zeros((2, count), np.bool_)
     for i, scene in enumerate((old, new)):
         if scene is not None:
             material = scene.materials[name]
             emission[i], double_sided[i] = material.emission, material.double_sided
     return _Rows(
-        np.stack([first, second]),
+        np.stack([first.corners, second.corners]),
+        np.stack([first.errors, second.errors]),
         emission,
         double_sided,
         np.full(count, weight),

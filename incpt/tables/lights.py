@@ -21,6 +21,10 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 SMALLEST_AREA = 1e-18
 """Square metres in world space from which on triangles are lights. In single precision a smaller one has no
 normal, and where all are that small the density of a point has no end."""
+_HALF_ULP = 2.0**-24
+_COORDINATE_ULPS, _EXTENT_ULPS, _TRANSFORM_ULPS, _TEST_ULPS = 8, 16, 10, 4
+"""Rounding errors of a point on a triangle, as those of a hit in cl/path/setup_surface.cl, and of the
+distance at which a ray meets it, for the extent of the triangle."""
 SMALLEST_WEIGHT = float(np.finfo(np.float32).tiny)
 """The least `radiant_weight` of lights: in single precision less is black."""
 
@@ -90,6 +94,7 @@ def triangle_lights(scene: Scene, share: float) -> TriangleLights:
         return TriangleLights(np.zeros((len(layout.LightPlane), 0), np.float32), {})
     materials = [scene.materials[obj.material] for obj in objects]
     corners = np.concatenate([world_corners(obj) for obj in objects])
+    errors = np.concatenate([transform_errors(obj) for obj in objects])
     area = areas(corners)
     owner = np.repeat(np.arange(len(objects)), [len(obj.mesh.faces) for obj in objects])
     weights = np.array([radiant_weight(material) for material in materials])
@@ -101,15 +106,21 @@ def triangle_lights(scene: Scene, share: float) -> TriangleLights:
     density = weights * (share / float(power.sum()))
     emission = np.array([material.emission for material in materials])
     sides = np.array([material.double_sided for material in materials]) * layout.LightFlag.DOUBLE_SIDED
-    planes = light_planes(corners[kept], emission[owner], density[owner], power, sides[owner])
+    planes = light_planes(corners[kept], emission[owner], density[owner], power, sides[owner], errors[kept])
     lit = np.flatnonzero(np.bincount(owner)).tolist()
     return TriangleLights(planes, {objects[i].material: float(density[i]) for i in lit})
 
 
 def light_planes(
-    corners: Array, emission: Array, density: Array, power: Array, flags: npt.NDArray[np.integer]
+    corners: Array,
+    emission: Array,
+    density: Array,
+    power: Array,
+    flags: npt.NDArray[np.integer],
+    errors: Array,
 ) -> npt.NDArray[np.float32]:
-    """(len(LightPlane), N) of triangles (N, 3, 3), which are chosen by their power; one of them at least."""
+    """(len(LightPlane), N) of triangles (N, 3, 3), which are chosen by their power; one of them at least.
+    `errors` (N, 3) are those of `transform_errors`."""
     plane = layout.LightPlane
     planes = np.zeros((len(plane), len(corners)), np.float32)
     planes[plane.VERTEX_X : plane.VERTEX_Z + 1] = corners[:, 0].T
@@ -120,7 +131,32 @@ def light_planes(
     planes[plane.ALIAS_PROBABILITY], alias = alias_table(power)
     planes[plane.ALIAS] = alias.view(np.float32)
     planes[plane.FLAGS] = flags.astype(np.uint32).view(np.float32)
+    planes[plane.SLACK] = slack(corners, errors)
     return planes
+
+
+def slack(corners: Array, errors: Array) -> Array:
+    """(N,) how far a point that is chosen on triangles (N, 3, 3) may lie off them as rays meet them, in
+    metres: by the rounding of their corners and of the point, of the way of a ray into the space of an object
+    (`errors` (N, 3), along each axis), and of the test of a ray against them."""
+    edge_1, edge_2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(edge_1, edge_2)
+    length = np.linalg.norm(normal, axis=1)
+    extent = np.maximum(np.abs(edge_1), np.abs(edge_2))
+    error = _HALF_ULP * (_COORDINATE_ULPS * (np.abs(corners[:, 0]) + extent) + _EXTENT_ULPS * extent) + errors
+    off = np.einsum("ij,ij->i", np.abs(normal), error) / length
+    size = np.linalg.norm(extent, axis=1)
+    return np.asarray(off + _HALF_ULP * _TEST_ULPS * size**3 / length)
+
+
+def transform_errors(obj: Object) -> Array:
+    """(F, 3) how far rounding may move a point of each triangle on its way from the object's space to world
+    space and back, along each axis, in metres."""
+    matrix = np.abs(obj.world_from_object)
+    inverse = np.abs(affine.invert(obj.world_from_object))
+    reach = np.abs(world_corners(obj)).max(axis=1)
+    local = reach @ inverse[:, :3].T + inverse[:, 3]
+    return np.asarray(_HALF_ULP * _TRANSFORM_ULPS * (local @ matrix[:, :3].T + matrix[:, 3]))
 
 
 def areas(corners: Array) -> Array:

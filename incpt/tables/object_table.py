@@ -15,7 +15,6 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
-from incpt.accel import bvh
 from incpt.core import affine, layout
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
@@ -26,7 +25,6 @@ _MOST_FACES_OF_ALL = 4096
 """Of one object, and of all together, that stand in the top level in world space."""
 _HIDDEN = np.iinfo(np.int64).max
 """The size of an object that is not seen."""
-_NOT_MOVED = np.eye(3, 4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +77,7 @@ class ObjectTable:
         rows[same], bounds[same] = self.rows[source[same]], self.bounds[source[same]]
         changed = _all_but(len(objects), same)
         for i in changed.tolist():
-            _describe(objects[i], vertices.get(i), rows[i])
+            _describe(objects[i], rows[i])
             bounds[i] = objects[i].world_bounds
         table = ObjectTable(objects, rows, bounds, sizes, vertices, tuple(scene.materials), packings)
         everything = slice(None)
@@ -155,17 +153,10 @@ class PlacedObjects:
         return self._pool.device.upload(rows if len(rows) else np.zeros(1, layout.OBJECT))
 
 
-def _describe(obj: Object, world_vertices: npt.NDArray[np.float32] | None, row: Any) -> None:
-    """Fill in what depends on the object alone. `world_vertices` (V, 3) are given where its triangles are
-    part of the top level."""
+def _describe(obj: Object, row: Any) -> None:
+    """Fill in what depends on the object alone."""
     matrix = obj.world_from_object
-    inverse = affine.invert(matrix)
-    row["world_from_object"], row["object_from_world"] = matrix.ravel(), inverse.ravel()
-    if world_vertices is not None:
-        bounds = np.stack([world_vertices.min(axis=0), world_vertices.max(axis=0)])
-        row["position_error"] = bvh.position_error(bounds, _NOT_MOVED, _NOT_MOVED)
-    else:
-        row["position_error"] = bvh.position_error(obj.mesh.bounds, matrix, inverse)
+    row["world_from_object"], row["object_from_world"] = matrix.ravel(), affine.invert(matrix).ravel()
     row["visible"] = obj.visible
     row["winding"] = np.sign(np.linalg.det(matrix[:, :3]))
 
