@@ -41,6 +41,11 @@
 #define FIELD(word, name) ((word) >> name##_SHIFT & name##_MASK)
 #define IN_FIELD(number, name) ((number) << name##_SHIFT)
 
+// An index below 2^31, or 0 in place of NO_INDEX. This is arithmetic, not a choice: compilers move what only
+// one branch needs into it, and loops over lanes then read it in all lanes nevertheless, also at NO_INDEX.
+#define INDEX_MASK(index) (((index) >> 31) - 1u) // all bits, or none for NO_INDEX
+#define INDEX_OR_0(index) ((index) & INDEX_MASK(index))
+
 typedef struct {
     float x, y, z;
 } Vec3;

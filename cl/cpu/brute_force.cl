@@ -14,7 +14,7 @@
 // Planes of what brute force finds.
 #define FOUND_DISTANCE 0
 #define FOUND_WEIGHT 1 // three planes
-#define FOUND_PLACE 4  // the index of the quad, or as FOUND_SIDE says
+#define FOUND_PLACE 4  // the index of the quad, or as FOUND_SIDE says; 0 where nothing is met
 
 // The place of a hit with a parallelepiped has the index of one of two opposite sides, the bit FOUND_SIDE,
 // and the axis of the local coordinates along which the two are opposite. The weights are local coordinates
@@ -175,7 +175,7 @@ INLINE void brute_force_group(const BruteForce *brute_force, __local const float
         group.weight[i] = 0.0f;
     }
     group.limit = any ? load_lanes(limits) : INFINITY;
-    group.place = NO_INDEX;
+    group.place = any ? NO_INDEX : 0u;
     for (uint waiting = clusters_met(brute_force, &group, axes); waiting; waiting &= waiting - 1) {
         __global const Cluster *cluster = brute_force->clusters + BVH_FIRST_BIT(waiting);
         for (uint i = cluster->first_parallelepiped; i < cluster->parallelepiped_end; i++)
@@ -221,9 +221,10 @@ INLINE Vec3 side_weights(uint turns, Vec3 point) {
 INLINE RawHit found_hit(const BruteForce *brute_force, __local const float *found, uint path) {
     uint place = load_bits(found, FOUND_PLACE * BLOCK_STRIDE + path);
     Vec3 weight = load3(found + FOUND_WEIGHT * BLOCK_STRIDE, BLOCK_STRIDE, path);
-    int met = place != NO_INDEX;
-    int side = met & ((place & FOUND_SIDE) != 0u);
-    uint index = side ? FIELD(place, FOUND_INDEX) : met ? place : 0u;
+    float distance = found[FOUND_DISTANCE * BLOCK_STRIDE + path];
+    int met = distance < INFINITY;
+    int side = (place & FOUND_SIDE) != 0u;
+    uint index = FIELD(place, FOUND_INDEX);
     int opposite = side & (component(weight, FIELD(place, FOUND_AXIS)) > 0.5f);
     index += opposite ? 1u : 0u;
     __global const Quad *quad = brute_force->quads + index;
@@ -237,7 +238,7 @@ INLINE RawHit found_hit(const BruteForce *brute_force, __local const float *foun
     Vec3 turned = select(corner == 1u, vec3(weight.z, weight.x, weight.y), weight);
     turned = select(corner == 2u, vec3(weight.y, weight.z, weight.x), turned);
     RawHit hit;
-    hit.distance = found[FOUND_DISTANCE * BLOCK_STRIDE + path];
+    hit.distance = distance;
     hit.object = met ? quad->object : NO_INDEX;
     hit.triangle = met ? triangle : NO_INDEX;
     hit.weight[0] = turned.x;

@@ -11,7 +11,7 @@ __kernel void first_hits(LAUNCH_PARAMETERS, SHADING_PARAMETERS, PATH_STATE_PARAM
     uint pixel = load_path(&state, path).pixel;
     Surface surface = load_surface(&state, path);
     int missed = surface.object == NO_INDEX;
-    Vec3 color = vec3_at(materials[missed ? 0u : surface.material].base_color);
+    Vec3 color = vec3_at(materials[surface.material & INDEX_MASK(surface.object)].base_color);
     Vec3 nothing = vec3(0.0f, 0.0f, 0.0f);
     object_ids[pixel] = surface.object;
     store3(first_surface, pixels, pixel, select(missed, nothing, surface.shading));

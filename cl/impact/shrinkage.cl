@@ -245,8 +245,10 @@ __kernel WIDE void pool_evidence(PICTURE_PARAMETERS, CELL_EVIDENCE_PARAMETERS, P
         __global const float *lower = middle + (row < rows - 1 ? columns : 0);
         EACH_COLUMN(x, patch) {
 #define THREE_ROWS(at) (middle[at] + (has_upper * upper[at] + has_lower * lower[at]))
-            const float left = x > 0u ? THREE_ROWS(x - 1u) : 0.0f;
-            const float right = x + 1u < (size_t)columns ? THREE_ROWS(x + 1u) : 0.0f;
+            // By factors, as above: in loops over lanes what is read under a condition is read always.
+            const size_t has_left = x > 0u, has_right = x + 1u < (size_t)columns;
+            const float left = (float)has_left * THREE_ROWS(x - has_left);
+            const float right = (float)has_right * THREE_ROWS(x + has_right);
             const float sum = THREE_ROWS(x) + 0.5f * (left + right);
 #undef THREE_ROWS
             pooled_evidence[y * columns + x] = sum * (1.0f / (4u * CELL_SIZE * CELL_SIZE));

@@ -48,8 +48,7 @@ INLINE uint crosses_boxes(const Change *change, uint box, Ray ray, float limit) 
 
 // 1 where a hit on the object is enough. `object` may be NO_INDEX.
 INLINE uint is_changed(const Changes *changes, uint object) {
-    uint hit = object != NO_INDEX;
-    return changes->changed_objects[hit ? object : 0u] & hit;
+    return changes->changed_objects[INDEX_OR_0(object)] & (uint)(object != NO_INDEX);
 }
 
 // Notes of the path at `place` that it has met something that changed, if `met` is 1.

@@ -80,8 +80,9 @@ INLINE Vec3 pack_vertex(__global const TrianglePack *pack, uint corner, uint lan
 // normals of its corners cancel out, it is the geometric normal itself.
 INLINE Vec3 shading_normal(__global const Object *object, __global const float *normals, uint face,
                            Vec3 weight, Vec3 geometric) {
-    int smooth = object->first_normal != NO_INDEX;
-    __global const float *n = normals + (smooth ? object->first_normal + 9u * (size_t)face : 0u);
+    int smooth = object->is_smooth != 0u;
+    // Of a flat mesh, any normal is read, and not used.
+    __global const float *n = normals + object->first_normal + 9u * (size_t)object->is_smooth * face;
     Vec3 interpolated = vec3(weight.x * n[0] + weight.y * n[3] + weight.z * n[6],
                              weight.x * n[1] + weight.y * n[4] + weight.z * n[7],
                              weight.x * n[2] + weight.y * n[5] + weight.z * n[8]);
@@ -159,6 +160,6 @@ INLINE Surface surface_at(const Geometry *geometry, const RawHit *hit) {
 // Which stage shades a path that has hit this object. A path that has hit nothing is given any answer.
 INLINE uint hit_class(const Geometry *geometry, __global const Material *materials, uint object,
                       uint in_medium) {
-    uint material = geometry->objects[object == NO_INDEX ? 0u : object].material;
+    uint material = geometry->objects[INDEX_OR_0(object)].material;
     return in_medium | (materials[material].flags & MATERIAL_TRANSMISSIVE) ? CLASS_MEDIUM : CLASS_SURFACE;
 }

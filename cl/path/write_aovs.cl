@@ -8,7 +8,7 @@ INLINE void write_aovs_path(const Shading *shading, const State *state, uint pat
     Surface surface = load_surface(state, path);
     int missed = surface.object == NO_INDEX;
     Vec3 nothing = vec3(0.0f, 0.0f, 0.0f);
-    Vec3 albedo = vec3_at(shading->materials[missed ? 0u : surface.material].base_color);
+    Vec3 albedo = vec3_at(shading->materials[surface.material & INDEX_MASK(surface.object)].base_color);
     albedo = select(missed, nothing, albedo);
     Vec3 normal = select(missed, nothing, surface.shading);
     path_buffer[SAMPLE_ALBEDO_R * stride + place] = albedo.x;

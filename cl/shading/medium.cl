@@ -8,9 +8,10 @@ typedef struct {
     uint entry[MEDIUM_STACK_SIZE];
 } MediumStack;
 
-// The properties of a medium. MEDIUM_NONE gives those of some material, because all lanes read one.
+// The properties of a medium. MEDIUM_NONE gives those of some material, because all lanes read one; by
+// arithmetic, as INDEX_OR_0.
 INLINE __global const Material *medium_material(__global const Material *materials, uint medium) {
-    return &materials[medium == MEDIUM_NONE ? 0u : medium];
+    return &materials[medium & (((medium + 1u) >> 16) - 1u)];
 }
 
 // The higher wins; 0 is the highest of all.

@@ -530,7 +530,8 @@ OBJECT = _packed(
         ("world_from_object", np.float32, (12,)),
         ("first_node", np.uint32),  # of its mesh in the buffer of all nodes
         ("first_pack", np.uint32),
-        ("first_normal", np.uint32),  # float index of the mesh's corner normals, or NO_INDEX: flat faces
+        ("first_normal", np.uint32),  # float index of the mesh's corner normals; 0 where it has none
+        ("is_smooth", np.uint32),  # 1: it has normals
         ("material", np.uint32),
         ("visible", np.uint32),
         (

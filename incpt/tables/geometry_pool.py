@@ -48,11 +48,11 @@ class PooledMesh:
         self._nodes, self._packs, self._normals = nodes, packs, normals
 
     @property
-    def place(self) -> tuple[int, int, int]:
-        """Its first node, its first pack, and the first float of its normals (NO_INDEX without normals) in
-        the buffers of the pool, until `GeometryPool.packings` changes."""
-        first_normal = layout.NO_INDEX if self._normals is None else self._normals.first
-        return self._nodes.first, self._packs.first, first_normal
+    def place(self) -> tuple[int, int, int, int]:
+        """Its first node, its first pack, the first float of its normals, and 1 where it has normals, in the
+        buffers of the pool, until `GeometryPool.packings` changes."""
+        normals = (0, 0) if self._normals is None else (self._normals.first, 1)
+        return self._nodes.first, self._packs.first, *normals
 
 
 class GeometryPool:

@@ -98,8 +98,9 @@ class ObjectTable:
     def _refer_to_meshes(
         self, meshes: Mapping[Mesh, PooledMesh], chosen: npt.NDArray[np.int64] | slice
     ) -> None:
-        places = np.array([meshes[obj.mesh].place for obj in self._chosen(chosen)], np.uint32).reshape(-1, 3)
-        for name, column in zip(("first_node", "first_pack", "first_normal"), places.T, strict=True):
+        places = np.array([meshes[obj.mesh].place for obj in self._chosen(chosen)], np.uint32).reshape(-1, 4)
+        columns = ("first_node", "first_pack", "first_normal", "is_smooth")
+        for name, column in zip(columns, places.T, strict=True):
             self.rows[name][chosen] = column
 
     def _chosen(self, chosen: npt.NDArray[np.int64] | slice) -> tuple[Object, ...]:

@@ -50,14 +50,14 @@ class World:
     material_flags: int = 0
 
     def __post_init__(self) -> None:
-        nodes, packs, normals, first = [], [], [np.empty(0, np.float32)], {}
+        nodes, packs, normals, first = [], [], [], {}
         counts = [0, 0, 0]
         for obj in self.objects:
             mesh = obj.mesh
             if id(mesh) in first:
                 continue
             tree = self.trees.setdefault(id(mesh), bvh.build_mesh(self.device, mesh))
-            first[id(mesh)] = (*counts[:2], layout.NO_INDEX if mesh.normals is None else counts[2])
+            first[id(mesh)] = (*counts[:2], *((0, 0) if mesh.normals is None else (counts[2], 1)))
             nodes.append(tree.nodes)
             packs.append(tree.packs)
             if mesh.normals is not None:
@@ -73,7 +73,9 @@ class World:
             record["world_from_object"] = matrix.ravel()
             inverse = affine.invert(matrix)
             record["object_from_world"] = inverse.ravel()
-            record["first_node"], record["first_pack"], record["first_normal"] = first[id(obj.mesh)]
+            columns = ("first_node", "first_pack", "first_normal", "is_smooth")
+            for name, value in zip(columns, first[id(obj.mesh)], strict=True):
+                record[name] = value
             record["visible"] = obj.visible
         material = np.zeros(1, layout.MATERIAL)
         material["flags"] = self.material_flags
@@ -83,7 +85,7 @@ class World:
             "nodes": np.concatenate(nodes or [top.nodes]),
             "packs": np.concatenate(packs or [np.zeros(1, layout.TRIANGLE_PACK)]),
             "objects": records,
-            "normals": np.concatenate(normals),
+            "normals": np.concatenate(normals or [np.zeros(9, np.float32)]),
             "materials": material,
             "layers": np.zeros(1, np.float32),
         }

@@ -64,12 +64,12 @@ def read(pool: GeometryPool, name: str, dtype: npt.DTypeLike, first: int, count:
 
 def check_place(pool: GeometryPool, mesh: Mesh, pooled: PooledMesh, tree: bvh.Bvh) -> None:
     """Where the handle says lies that tree, with the normals of the mesh."""
-    first_node, first_pack, first_normal = pooled.place
+    first_node, first_pack, first_normal, is_smooth = pooled.place
     nodes = read(pool, "nodes", layout.NODE, first_node, len(tree.nodes))
     packs = read(pool, "packs", layout.TRIANGLE_PACK, first_pack, len(tree.packs))
     assert nodes.tobytes() == tree.nodes.tobytes() and packs.tobytes() == tree.packs.tobytes()
     if mesh.normals is None:
-        assert first_normal == layout.NO_INDEX
+        assert (first_normal, is_smooth) == (0, 0)
     else:
         normals = read(pool, "normals", np.float32, first_normal, mesh.normals.size)
         np.testing.assert_array_equal(normals, mesh.normals.ravel())

@@ -184,7 +184,7 @@ def check_as_fresh(tables: SceneTables) -> None:
         )
         check_mesh(obj.mesh, nodes[first_node:], packs[first_pack:])
         if obj.mesh.normals is None:
-            assert first_normal == layout.NO_INDEX
+            assert (first_normal, int(row["is_smooth"])) == (0, 0)
         else:
             found = normals[first_normal : first_normal + obj.mesh.normals.size]
             np.testing.assert_array_equal(found, obj.mesh.normals.ravel())

@@ -1,0 +1,136 @@
+"""Runs the kernels of small scenes on a device that checks every access to memory: the simulator Oclgrind.
+
+    oclgrind ... python -m support.checked simulator SCHEDULE SCENE
+
+Or, as `memory` in place of `simulator`, on the device of the tests, with buffers that end where memory ends.
+Oclgrind takes no intrinsics of processors and none of some operations on bits, so that these are spelled out
+here; all other text is what devices get.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from dataclasses import replace
+from typing import Any
+
+from incpt.core.settings import RenderSettings
+from incpt.device.device import Device
+from incpt.render.session import Session
+from incpt.render.wavefront import Wavefront
+from incpt.scene.camera import Camera
+from incpt.scene.environment import Environment
+from incpt.scene.material import Material
+from incpt.scene.model import Object, Scene
+from incpt.scene.shapes import shape
+from support.guarded import GuardedDevice
+from support.small_scenes import mixed_scene
+
+_BITS = """
+uint plain_reverse(uint x) {
+    uint r = 0;
+    for (volatile int i = 0; i < 32; i++) { r = r << 1 | (x & 1u); x >>= 1; }
+    return r;
+}
+uint plain_count(uint x) {
+    uint n = 0;
+    for (volatile int i = 0; i < 32; i++) { n += x & 1u; x >>= 1; }
+    return n;
+}
+uint plain_first(uint x) {
+    uint n = 32;
+    for (volatile int i = 31; i >= 0; i--)
+        n = x >> i & 1u ? i : n;
+    return n;
+}
+uint plain_clear(uint x) {
+    volatile uint y = x;
+    return y & (y - 1u);
+}
+"""
+_SPELLED_OUT = (
+    (r"INLINE uint reverse_bits\(uint x\) \{.*?\n\}", ""),
+    (r"#define REVERSE_BITS\(x\) \S+", "#define REVERSE_BITS(x) plain_reverse(x)"),
+    (r"#define (BVH_COUNT_BITS|BVH_FIRST_BIT)\(x\).*?\n", ""),
+    (r"(\w+) &= \1 - 1", r"\1 = plain_clear(\1)"),
+    (r"__builtin_(sqrt|fabs|floor)f\(", r"\1("),
+    (r"__builtin_prefetch\(", "(void)("),
+)
+_DEFINED = "#define BVH_COUNT_BITS(x) plain_count(x)\n#define BVH_FIRST_BIT(x) plain_first(x)\n"
+
+
+class CheckedDevice(Device):
+    """The simulator; `in_blocks`: it is taken for a CPU under clang without AVX-512."""
+
+    def __init__(self, in_blocks: bool) -> None:
+        self._in_blocks = in_blocks
+        super().__init__("oclgrind")
+
+    @property
+    def is_clang_cpu(self) -> bool:
+        return self._in_blocks
+
+    def program_text(self, file: str, features: tuple[str, ...] = ()) -> str:
+        text = super().program_text(file, features)
+        for pattern, plain in _SPELLED_OUT:
+            text = re.sub(pattern, plain, text, flags=re.DOTALL)
+        return _BITS + _DEFINED + text
+
+
+def empty_glass() -> Scene:
+    """No object, and a material that lets light through."""
+    return Scene(
+        environment=Environment((1, 1, 1)), materials={"glass": Material(roughness=0, transmission=1)}
+    )
+
+
+def flat_box() -> Scene:
+    """A box without normals of its own, a lamp of one material, and sky in nearly all pixels."""
+    materials = {"box": Material(), "lamp": Material(emission=(1, 1, 1))}
+    objects = (
+        Object("box", shape("cube"), "box", scale=(0.1, 0.1, 0.1)),
+        Object("lamp", shape("plane"), "lamp", (0, 1, 0), (180, 0, 0)),
+    )
+    return Scene(Camera((0, 0, 3), (0, 0, 0)), Environment((1, 1, 1)), materials, objects)
+
+
+def frosted() -> Scene:
+    """Rough glass that absorbs."""
+    scene = mixed_scene()
+    glass = replace(scene.material("glass"), roughness=0.5, transmission=0.5)
+    return replace(scene, materials={**scene.materials, "glass": glass})
+
+
+SCENES: dict[str, Any] = {
+    "empty": empty_glass,
+    "flat": flat_box,
+    "mixed": mixed_scene,
+    "frosted": frosted,
+}
+
+
+def check(by: str, schedule: str, name: str) -> None:
+    """Renders a scene, what its rays meet first, and an edit of each kind."""
+    device = CheckedDevice(schedule == "blocks") if by == "simulator" else GuardedDevice()
+    settings = RenderSettings(size=(5, 4), tile_size=4, nor=1, aovs=True, strategy="impact", max_bounces=2)
+    scene = replace(SCENES[name](), settings=settings)
+    session = Session(scene, device=device)
+    if schedule == "wavefront":
+        session._tracer = Wavefront(device)
+    session.render(1)
+    session.first_hits()
+    if scene.objects:
+        first = scene.objects[0]
+        session.edit(scene.with_object(first.name, position=(0.1, 0.2, 0)))
+        session.step()
+        session.image()
+        session.edit(session.scene.with_material(first.material, base_color=(0.3, 0.3, 0.3)))
+        session.step()
+        for obj in scene.objects:
+            session.edit(session.scene.without_object(obj.name))
+        session.step()
+    session.pass_image("albedo")
+
+
+if __name__ == "__main__":
+    check(*sys.argv[1:])
