@@ -46,7 +46,12 @@ INLINE void shade_path(const Params *params, const Shading *shading, const State
     Path p = load_path(state, path);
     __global const Material *material = &shading->materials[surface.material];
 
-    float facing = orient_surface(&surface, direction);
+#ifdef MATTE
+    int mirrors = 0;
+#else
+    int mirrors = (material->metallic > 0.0f) | (material->specular > 0.0f);
+#endif
+    float facing = orient_surface(&surface, direction, mirrors);
     Vec3 emitted = emitted_radiance(material, facing, surface.distance, p.bsdf_pdf);
     accumulate(state, result, mul(p.throughput, emitted));
 

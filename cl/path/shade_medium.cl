@@ -47,7 +47,7 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
     // A material that is partly transmissive is taken for opaque by chance.
     Uniform2 luck = uniform_2d(seed, p.sample, PAIR_LUCK(p.ray));
     int opaque = luck.v >= material->transmission;
-    float facing = orient_surface(&surface, direction);
+    float facing = orient_surface(&surface, direction, 1);
     Vec3 emitted = emitted_radiance(material, facing, surface.distance, p.bsdf_pdf);
     accumulate(state, result, select(opaque, vec3(0.0f, 0.0f, 0.0f), mul(throughput, emitted)));
 

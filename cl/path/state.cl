@@ -166,16 +166,43 @@ INLINE void store_surface(const State *state, uint path, const Surface *s) {
     store_bits(state->surfaces, SURFACE_FACE * stride + path, s->face);
 }
 
+#ifndef FLAT
+// The least cosine between a mirrored ray and the surface: little above it, and no more than the ray itself.
+#define LEAST_MIRRORED 0.01f
+
+// The shading normal, bent towards the geometric one as far as it takes for the mirror image of `wo`, the way
+// back along a ray, to stay above the surface; else smooth metal has black facets where it turns away. In the
+// plane of both normals the image of an angle p is at 2 n - p from the geometric normal if the shading normal
+// is at n, whatever lies across, so that the flattest image that is wanted and wo itself have the bent normal
+// between them.
+INLINE Vec3 mirroring_normal(Vec3 shading, Vec3 geometric, Vec3 wo) {
+    float facing = dot(geometric, wo), least = MIN(0.9f * facing, LEAST_MIRRORED);
+    Vec3 mirrored = subtract(scale(2.0f * dot(shading, wo), shading), wo);
+    Vec3 across = subtract(shading, scale(dot(shading, geometric), geometric));
+    across = scale(1.0f / SQRT(MAX(dot(across, across), 1e-20f)), across);
+    float aside = dot(across, wo);
+    float inverse = 1.0f / SQRT(MAX(aside * aside + facing * facing, 1e-20f));
+    float up = least * inverse;
+    float out = SQRT(MAX(1.0f - up * up, 0.0f));
+    Vec3 bent = add(scale(aside * inverse + out, across), scale(facing * inverse + up, geometric));
+    return select(dot(mirrored, geometric) < least, normalize(bent), shading);
+}
+#endif
+
 // Turns both normals to the side that a ray along `direction` comes from; returns the cosine between the
-// geometric normal as it was and the way back along the ray, which is above 0 on the outside. A shading
-// normal that looks away from the ray, or along the surface as seen by it, gives way to the geometric one.
-INLINE float orient_surface(Surface *surface, Vec3 direction) {
+// geometric normal as it was and the way back along the ray, which is above 0 on the outside. Where the
+// surface `mirrors`, the shading normal is bent so that it can. Else one that looks away from the ray, or
+// along the surface as seen by it, gives way to the geometric one.
+INLINE float orient_surface(Surface *surface, Vec3 direction, int mirrors) {
     float facing = -dot(surface->geometric, direction);
     float side = facing > 0.0f ? 1.0f : -1.0f;
     surface->geometric = scale(side, surface->geometric);
     surface->shading = scale(side, surface->shading);
-    surface->shading =
-        select(dot(surface->shading, direction) < -1e-4f, surface->shading, surface->geometric);
+#ifndef FLAT
+    Vec3 towards = select(dot(surface->shading, direction) < -1e-4f, surface->shading, surface->geometric);
+    Vec3 mirroring = mirroring_normal(surface->shading, surface->geometric, scale(-1.0f, direction));
+    surface->shading = select(mirrors, mirroring, towards);
+#endif
     return facing;
 }
 
