@@ -28,7 +28,7 @@ class IncptPeer:
     def load(self, job: Job) -> None:
         settings = RenderSettings(
             size=job.size, max_bounces=job.max_bounces, transmission_bounces=job.transmission_bounces,
-            strategy="restart",
+            strategy="restart", multiple_scattering=False,
         )  # fmt: skip
         self._session = Session(job.scene, settings=settings, device=self._device)
 

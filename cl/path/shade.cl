@@ -57,7 +57,8 @@ INLINE void shade_path(const Params *params, const Shading *shading, const State
 
     Vec3 wo;
     Frame frame = shading_frame(&surface, direction, &wo);
-    OpaqueBsdf bsdf = bsdf_of(material, shading->layers + surface.material * (ALBEDO_TABLE_SIZE + 1u));
+    OpaqueBsdf bsdf =
+        bsdf_of(material, shading->layers + surface.material * LAYER_SIZE, params->multiple_scattering);
     Ray next_ray;
     next_ray.origin = along(surface.position, surface.offset, surface.geometric);
     int scatters = p.bounces <= params->max_bounces;

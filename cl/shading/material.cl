@@ -4,17 +4,21 @@
 // Directions are local (normal along z), unit, and point away from the surface; densities are per solid
 // angle; the cosine of wi is part of what eval and sample return.
 //
-//   f = D V (F0 + (F90 - F0) (1 - <wo, h>)^5) + (1 - metallic) rho / pi (1 - E(wo)) (1 - E(wi)) / (1 - E_avg)
+//   f = D V (F0 + (F90 - F0) (1 - <wo, h>)^5) + base / pi (1 - E(wo)) (1 - E(wi)) / (1 - E_avg)
+//   base = (1 - metallic) rho + metallic M
 //
 // D and V are GGX with height-correlated Smith masking (Heitz 2014), Fresnel is Schlick's, and E is the
-// directional albedo of the layer, tabulated per material by albedo.py: what the layer reflects does not
-// reach the base, in both directions, so that a white base under a lossless layer reflects exactly
-// everything and the whole stays reciprocal (Kelemen and Szirmay-Kalos 2001).
+// directional albedo of what reflects at once, tabulated per material by albedo.py. What the layer reflects
+// does not reach the Lambertian base, in both directions, so that a white base under a lossless layer
+// reflects exactly everything and the whole stays reciprocal (Kelemen and Szirmay-Kalos 2001). What metal
+// does not reflect at once meets more microfacets, and the share M of it comes out after all, in the same
+// directions (C. Kulla and A. Conty, Revisiting Physically Based Shading at Imageworks, SIGGRAPH Courses
+// 2017): white metal loses nothing.
 //
 // The variant MATTE serves scenes without metals and layers, where f is rho / pi.
 
 typedef struct {
-    Vec3 base;    // albedo of the Lambertian part, without the layer's share
+    Vec3 base;    // albedo of what is not reflected at once
     Vec3 f0, f90; // specular reflectance at normal and at grazing incidence
     float alpha;  // GGX roughness
     float metallic;
@@ -32,7 +36,8 @@ typedef struct {
     float pdf;
 } BsdfSample;
 
-INLINE OpaqueBsdf bsdf_of(__global const Material *material, __global const float *layer) {
+// `multiple` is 1, or 0 where nothing comes out of metal that scatters more than once.
+INLINE OpaqueBsdf bsdf_of(__global const Material *material, __global const float *layer, float multiple) {
     OpaqueBsdf s;
     Vec3 color = vec3_at(material->base_color);
     float metallic = material->metallic;
@@ -40,6 +45,9 @@ INLINE OpaqueBsdf bsdf_of(__global const Material *material, __global const floa
     float r = (material->ior - 1.0f) / (material->ior + 1.0f);
     float dielectric_f0 = specular * r * r;
     s.base = scale(1.0f - metallic, color);
+#ifndef MATTE
+    s.base = add(s.base, scale(multiple, vec3_at(layer + ALBEDO_TABLE_SIZE + 1u)));
+#endif
     s.f0 = vec3(LERP(dielectric_f0, color.x, metallic), LERP(dielectric_f0, color.y, metallic),
                 LERP(dielectric_f0, color.z, metallic));
     float f90 = LERP(specular, 1.0f, metallic);
@@ -58,13 +66,13 @@ INLINE float layer_albedo(const OpaqueBsdf *s, float cosine) {
 }
 
 // Chance of sampling the specular part: its share of the albedo for wo, kept away from 0 and 1 where both
-// parts exist, so that neither is starved where the estimate is off.
+// parts exist, so that neither is starved where the estimate is off. Of metal it is known.
 INLINE float specular_probability(const OpaqueBsdf *s, float layer_wo) {
-    float specular = LERP(layer_wo, MAX(luminance(s->f0), 0.0f), s->metallic);
+    float specular = layer_wo * LERP(1.0f, MAX(luminance(s->f0), 0.0f), s->metallic);
     float diffuse = luminance(s->base) * (1.0f - layer_wo);
     float share = specular / MAX(specular + diffuse, 1e-12f);
     int both = (specular > 0.0f) & (diffuse > 0.0f);
-    return both ? CLAMP(share, 0.1f, 0.9f) : (diffuse > 0.0f ? 0.0f : 1.0f);
+    return both ? CLAMP(share, 0.1f, LERP(0.9f, 1.0f, s->metallic)) : (diffuse > 0.0f ? 0.0f : 1.0f);
 }
 
 #ifdef MATTE

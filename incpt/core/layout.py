@@ -65,6 +65,8 @@ MEDIUM_NONE = 0xFFFF
 
 ALBEDO_TABLE_SIZE = 32
 """Resolution of the specular albedo table in cosine and in roughness (see `albedo.py`)."""
+LAYER_SIZE = ALBEDO_TABLE_SIZE + 4
+"""Floats of a material in the table of layers (see `albedo.layer_row`)."""
 ENVIRONMENT_MAX_SIZE = 4096
 """Largest width or height of an environment image; the kernels' binary search takes log2 of it steps."""
 ENVIRONMENT_SEARCH_STEPS = 12
@@ -595,6 +597,7 @@ PARAMS = _packed(
         ("max_bounces", np.uint32),
         ("transmission_bounces", np.uint32),
         ("roulette_depth", np.uint32),
+        ("multiple_scattering", np.float32),  # 1, or 0: light that scatters again on rough metal is lost
         ("light_count", np.uint32),
         ("environment_probability", np.float32),  # of sampling the environment instead of a triangle
         ("environment_color", np.float32, (3,)),  # radiance; times the image

@@ -25,6 +25,8 @@ class RenderSettings:
     max_bounces           scattering events after the first hit; 0 is direct light only.
     transmission_bounces  passages through smooth dielectrics, counted apart.
     roulette_depth        scattering events before Russian roulette may end a path.
+    multiple_scattering   whether light that meets several microfacets of rough metal goes on; else it is
+                          lost, as in renderers that scatter once.
     tile_size             edge of a tile, pixels.
     nor                   repetitions of a tile while an edit is re-rendered, under "spiral" (NoR of
                           INCREMENTAL).
@@ -47,6 +49,7 @@ class RenderSettings:
     max_bounces: int = 3
     transmission_bounces: int = 12
     roulette_depth: int = 4
+    multiple_scattering: bool = True
     tile_size: int = 16
     nor: int = 256
     nor_adapts: bool = True
@@ -70,6 +73,7 @@ class RenderSettings:
             if name == "slots_per_step" and value is None:
                 continue
             object.__setattr__(self, name, whole(name, value, low, high))
+        require_bool("multiple_scattering", self.multiple_scattering)
         require_bool("aovs", self.aovs)
         require_bool("nor_adapts", self.nor_adapts)
         one_of("strategy", self.strategy, STRATEGIES)
@@ -106,5 +110,7 @@ def _whole_pair(value: Any) -> tuple[int, int]:
     return whole("size (width)", width, 1, limit), whole("size (height)", height, 1, limit)
 
 
-PICTURE_SETTINGS = ("max_bounces", "transmission_bounces", "roulette_depth", "seed")
+PICTURE_SETTINGS = (
+    *("max_bounces", "transmission_bounces", "roulette_depth", "multiple_scattering", "seed"),
+)
 """Settings that change what a sample is worth, so that what was accumulated cannot be kept."""

@@ -24,7 +24,8 @@ def path_params(
     params["camera"] = (camera.position, right, up, forward)
     params["width"], params["height"] = width, height
     params["in_squares"] = tables.has_trees
-    for name in ("tile_size", "seed", "max_bounces", "transmission_bounces", "roulette_depth"):
+    for name in ("tile_size", "seed", "max_bounces", "transmission_bounces", "roulette_depth",
+                 "multiple_scattering"):  # fmt: skip
         params[name] = getattr(settings, name)
     return params
 

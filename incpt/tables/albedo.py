@@ -20,6 +20,8 @@ from incpt.scene.material import Material
 Array = npt.NDArray[np.floating]
 
 _SAMPLES = 1024
+_LEAST_LOSS = 1e-3
+"""Of light, below which nothing is made of what scatters again: the table knows no better."""
 
 
 @lru_cache(maxsize=1)
@@ -65,14 +67,30 @@ def _visible_normal(
 
 
 def layer_row(material: Material) -> npt.NDArray[np.float32]:
-    """(ALBEDO_TABLE_SIZE + 1,) the layer's albedo by cosine, then 1 / (1 - its mean over the hemisphere)."""
+    """(LAYER_SIZE,) the albedo by cosine of what reflects at once, layer and metal in their shares;
+    1 / (1 - its mean over the hemisphere); and the colour of what scatters again on the metal in it."""
     place = material.roughness * (ALBEDO_TABLE_SIZE - 1)
     low = min(int(place), ALBEDO_TABLE_SIZE - 2)
     a, b = table()[:, low] + (table()[:, low + 1] - table()[:, low]) * (place - low)
     f0 = ((material.ior - 1) / (material.ior + 1)) ** 2
-    albedo = material.specular * (f0 * (a - b) + b)
-    # Exact mean, weighted with the cosine, of what the kernels interpolate linearly.
+    layer = material.specular * (f0 * (a - b) + b)
+    albedo = layer + (a - layer) * material.metallic
+    color = material.metallic * _scattered_again(np.asarray(material.base_color), _mean(a))
+    return np.array([*albedo, 1 / max(1 - _mean(albedo), 1e-6), *color], np.float32)
+
+
+def _mean(albedo: Array) -> float:
+    """Over the hemisphere, weighted with the cosine: exactly that of what kernels interpolate linearly."""
     mu = np.linspace(0.0, 1.0, ALBEDO_TABLE_SIZE)
-    step = mu[1]
-    mean = 2 * np.sum(step / 6 * (albedo[:-1] * (2 * mu[:-1] + mu[1:]) + albedo[1:] * (mu[:-1] + 2 * mu[1:])))
-    return np.append(albedo, 1 / max(1 - mean, 1e-6)).astype(np.float32)
+    first, last = albedo[:-1] * (2 * mu[:-1] + mu[1:]), albedo[1:] * (mu[:-1] + 2 * mu[1:])
+    return float(mu[1] / 3 * np.sum(first + last))
+
+
+def _scattered_again(f0: Array, albedo: float) -> Array:
+    """(3,) the share of the light lost to microfacets in the way that metal of reflectance `f0` sends back
+    after all, where `albedo` is the mean share that is not lost: a series of reflections, each with the mean
+    reflectance of Schlick's Fresnel term (Kulla and Conty 2017)."""
+    if 1 - albedo < _LEAST_LOSS:
+        return np.zeros(3)
+    fresnel = f0 + (1 - f0) / 21
+    return np.asarray(fresnel**2 * albedo / (1 - fresnel * (1 - albedo)))

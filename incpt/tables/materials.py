@@ -41,7 +41,7 @@ def material_tables(
     """Those of `materials`, numbered in order. `densities` are those of LightTables."""
     # One row at least: rays that miss read material 0.
     rows = np.zeros(max(len(materials), 1), layout.MATERIAL)
-    layers = np.zeros((len(rows), layout.ALBEDO_TABLE_SIZE + 1), np.float32)
+    layers = np.zeros((len(rows), layout.LAYER_SIZE), np.float32)
     flags = layout.MaterialFlag
     for row, layer, (name, material) in zip(rows, layers, materials.items(), strict=False):
         for field in _COPIED:

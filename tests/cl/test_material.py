@@ -34,12 +34,13 @@ MATERIALS = {
 }
 ANGLES_DEG = (0.0, 35.0, 70.0, 86.0)
 
-_SURFACE = "OpaqueBsdf s = bsdf_of(material, layer); Vec3 wo = vec3(ox[i], oy[i], oz[i]);"
+_SURFACE = "OpaqueBsdf s = bsdf_of(material, layer, multiple[0]); Vec3 wo = vec3(ox[i], oy[i], oz[i]);"
 
 
-def _arguments(material: Material) -> dict[str, npt.NDArray[np.generic]]:
+def _arguments(material: Material, multiple: float = 1.0) -> dict[str, npt.NDArray[np.generic]]:
     values = {k: v for k, v in asdict(material).items() if k in (layout.MATERIAL.names or ())}
-    return {"material": struct_rows(layout.MATERIAL, [values]), "layer": albedo.layer_row(material)}
+    return {"material": struct_rows(layout.MATERIAL, [values]), "layer": albedo.layer_row(material),
+            "multiple": np.float32([multiple])}  # fmt: skip
 
 
 def _components(prefix: str, w: Array, count: int) -> dict[str, npt.NDArray[np.float32]]:
@@ -47,14 +48,16 @@ def _components(prefix: str, w: Array, count: int) -> dict[str, npt.NDArray[np.f
     return {prefix + axis: np.ascontiguousarray(row) for axis, row in zip("xyz", w, strict=True)}
 
 
-def evaluate(material: Material, wo: Array, wi: Array, features: tuple[str, ...] = ()) -> tuple[Array, Array]:
+def evaluate(
+    material: Material, wo: Array, wi: Array, features: tuple[str, ...] = (), multiple: float = 1.0
+) -> tuple[Array, Array]:
     """f cos (3, N) and pdf (N,) for directions (3,) or (3, N)."""
     count = max(np.reshape(wo, (3, -1)).shape[1], np.reshape(wi, (3, -1)).shape[1])
     body = _SURFACE + """BsdfValue b = eval_bsdf(&s, wo, vec3(ix[i], iy[i], iz[i]));
         r[i] = b.f_cos.x; g[i] = b.f_cos.y; b_[i] = b.f_cos.z; pdf[i] = b.pdf;"""  # fmt: skip
     r, g, b, pdf = call(
         "material", body, count, ("r", "g", "b_", "pdf"), features, **_components("o", wo, count),
-        **_components("i", wi, count), **_arguments(material),
+        **_components("i", wi, count), **_arguments(material, multiple),
     )  # fmt: skip
     return np.stack([r, g, b]), pdf
 
@@ -139,7 +142,7 @@ def test_furnace_lambert_is_exact() -> None:
             np.testing.assert_allclose(share, MATERIALS[name].base_color, rtol=1e-5)
 
 
-def integral(material: Material, angle_deg: float) -> Array:
+def integral(material: Material, angle_deg: float, multiple: float = 1.0) -> Array:
     """(3,) of f cos over the hemisphere, by the midpoint rule in double resolution around the mirror image
     of wo: spherical coordinates about it, whose polar angle grows with the cube of the grid's."""
     wo = wo_at(angle_deg)
@@ -152,7 +155,7 @@ def integral(material: Material, angle_deg: float) -> Array:
     tangent = np.cross(mirror, [0.3, -0.7, 0.2])
     tangent /= np.linalg.norm(tangent)
     frame = np.stack([tangent, np.cross(mirror, tangent), mirror], axis=1)
-    value = evaluate(material, wo, frame @ local)[0].reshape(3, n, m)
+    value = evaluate(material, wo, frame @ local, multiple=multiple)[0].reshape(3, n, m)
     return np.asarray(np.einsum("cij,i->c", value, np.sin(theta) * dtheta * 2 * np.pi / m))
 
 
@@ -214,15 +217,29 @@ def test_albedo_table(row: int) -> None:
 
 
 @pytest.mark.parametrize("roughness", [0.2, 0.5, 0.8, 1.0])
-def test_furnace_metal_loses_what_scatters_twice(roughness: float) -> None:
+def test_furnace_metal(roughness: float) -> None:
+    """White metal reflects everything, coloured metal at least what it reflects at once; without multiple
+    scattering all lose what scatters twice."""
     white = Material((1, 1, 1), metallic=1.0, roughness=roughness)
     gold = Material((1.0, 0.7, 0.3), metallic=1.0, roughness=roughness)
     for angle in (0.0, 45.0, 75.0):
         a, b = _single_scattering(roughness, float(np.cos(np.radians(angle))))
         assert a <= 1
-        np.testing.assert_allclose(integral(white, angle), a, atol=4e-3)
-        expected = [f0 * (a - b) + b for f0 in gold.base_color]
-        np.testing.assert_allclose(integral(gold, angle), expected, atol=4e-3)
+        np.testing.assert_allclose(integral(white, angle), 1, atol=6e-3)
+        np.testing.assert_allclose(integral(white, angle, multiple=0), a, atol=4e-3)
+        expected = np.array([f0 * (a - b) + b for f0 in gold.base_color])
+        np.testing.assert_allclose(integral(gold, angle, multiple=0), expected, atol=4e-3)
+        # A second reflection colours light more than the first.
+        gained = integral(gold, angle) - expected
+        assert (np.diff(gained) < 2e-3).all() and (gained > -5e-3).all()
+        assert gained[0] == pytest.approx(1 - a, abs=6e-3) and gained[2] < 0.2 * (1 - a) + 5e-3
+
+
+@pytest.mark.parametrize("metallic", [0.25, 0.5, 0.75])
+def test_furnace_between_metal_and_plastic(metallic: float) -> None:
+    material = Material((1, 1, 1), metallic=metallic, roughness=0.7)
+    for angle in (0.0, 45.0, 75.0):
+        np.testing.assert_allclose(integral(material, angle), 1, atol=8e-3)
 
 
 def test_no_material_reflects_more_than_arrives() -> None:

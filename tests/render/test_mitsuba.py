@@ -25,7 +25,7 @@ def test_same_picture_as_mitsuba(name: str) -> None:
         expected, expected_error = (stored[key].astype(np.float64) for key in ("mean", "error"))
     images = repeat(
         reference.scene(), reference.spp // RENDERS, RENDERS, size=SIZE, max_bounces=reference.max_bounces,
-        transmission_bounces=60, roulette_depth=255,
+        transmission_bounces=60, roulette_depth=255, multiple_scattering=False,
     )  # fmt: skip
     image = images.mean(axis=0)
     np.testing.assert_allclose(image.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), rtol=0.01)

@@ -32,7 +32,7 @@ def row(device: Device, made: MaterialTables, index: int) -> dict[str, Any]:
 
 
 def layer(device: Device, made: MaterialTables, index: int) -> npt.NDArray[np.float32]:
-    layers = np.zeros((index + 1, layout.ALBEDO_TABLE_SIZE + 1), np.float32)
+    layers = np.zeros((index + 1, layout.LAYER_SIZE), np.float32)
     device.read(made.buffers["layers"], layers)
     return layers[index]
 
@@ -62,7 +62,7 @@ def test_layers_follow_what_their_albedo_depends_on(device: Device) -> None:
     for name in NAMES:
         made = tables(device, Material(), Material(**{name: unlike_default(name)}))
         is_other = not np.array_equal(layer(device, made, 0), layer(device, made, 1))
-        assert is_other == (name in ("roughness", "specular", "ior")), name
+        assert is_other == (name in ("roughness", "specular", "ior", "metallic")), name
 
 
 def test_there_is_a_row_without_any_material(device: Device) -> None:
