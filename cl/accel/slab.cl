@@ -4,8 +4,18 @@
 // plane * inverse + shift. There are two shifts, so that rounding errs on the side of a hit: the near plane
 // counts as nearer, the far plane as farther than it is.
 
-// Relative rounding errors of the box test: several ulps, because compilers may or may not fuse operations.
+// Relative rounding errors of the box test: several ulps, because compilers may or may not fuse operations. A
+// reciprocal that is not the nearest one, as OpenCL allows it, is two ulps more.
+#ifdef INEXACT_DIVISION
+#define BVH_SLACK 1e-6f
+#else
 #define BVH_SLACK 4e-7f
+#endif
+#ifdef PERTURBED_DIVISION
+#define BVH_RECIPROCAL(x, AS_FLOAT, AS_INT) AS_FLOAT(AS_INT(1.0f / (x)) + (AS_INT(1.0f / (x)) & 1) * 4 - 2)
+#else
+#define BVH_RECIPROCAL(x, AS_FLOAT, AS_INT) (1.0f / (x))
+#endif
 // Direction components below this count as zero; their reciprocal stays finite, so that no NaN can arise.
 #define BVH_ZERO 1e-20f
 #define BVH_INVERSE_ZERO 1e25f
@@ -36,7 +46,7 @@ typedef struct {
         const FLOAT size = AS_FLOAT(AS_INT(direction) & INT_MAX);                                            \
         const FLOAT least =                                                                                  \
             AS_FLOAT((AS_INT(direction) & INT_MIN) | AS_INT((FLOAT)(1.0f / BVH_INVERSE_ZERO)));              \
-        const FLOAT inverse = 1.0f / (size < BVH_ZERO ? least : direction);                                  \
+        const FLOAT inverse = BVH_RECIPROCAL(size < BVH_ZERO ? least : direction, AS_FLOAT, AS_INT);         \
         const FLOAT between = size < BVH_ZERO ? (FLOAT)(BVH_INVERSE_ZERO * 1e-10f) : (FLOAT)(0.0f);          \
         return NAME##_by_inverse(origin, inverse, between);                                                  \
     }

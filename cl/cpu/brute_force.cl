@@ -165,7 +165,7 @@ INLINE void brute_force_group(const BruteForce *brute_force, __local const float
                               __local float *occluders) {
     const uint axes[3] = {bvh_x_axis(axis), bvh_y_axis(axis), axis};
     RayGroup group;
-    group.shear[2] = 1.0f / load_lanes(rays + (3 + axis) * BLOCK_STRIDE);
+    group.shear[2] = BVH_RECIPROCAL(load_lanes(rays + (3 + axis) * BLOCK_STRIDE), as_float16, as_int16);
 #pragma unroll
     for (uint i = 0; i < 3; i++) {
         group.origin[i] = load_lanes(rays + axes[i] * BLOCK_STRIDE);

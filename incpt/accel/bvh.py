@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core import bindings, layout
-from incpt.core.errors import InputError
+from incpt.core.errors import DeviceError, InputError
 from incpt.device.device import Device
 from incpt.scene.mesh import Mesh
 
@@ -26,6 +26,8 @@ LARGEST_SERIAL_RANGE = 1 << 15
 """Boxes that one work-item may split alone; larger ranges are too few to keep a device busy."""
 CHUNK = 1 << 12
 """Boxes that one work-item takes of such a range."""
+MOST_PACKS = layout.PLACE_PACK.mask + 1
+"""Of one tree: the place of a triangle has no room for more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +87,8 @@ def build_boxes(
 ) -> Bvh:
     """The tree over `count` boxes in a buffer, laid out as Box of cl/accel/build_bvh.cl. A leaf is a pack of
     up to `leaf_size` faces of the mesh in the buffers `faces` and `vertices`, or without these a single box,
-    whose number is the reference. Raises DeviceError where the device's memory runs out.
+    whose number is the reference. Raises DeviceError where the device's memory runs out, where there are more
+    packs than kernels can address, and where the device splits ranges wrongly.
     """
     # Kernel arguments for a mesh that is not there are filled with any buffer and never read.
     mesh = (faces, vertices) if faces is not None else (boxes, boxes)
@@ -94,6 +97,8 @@ def build_boxes(
     range_count, node_count, pack_count = 1, 0, 0
     nodes, packs, levels = [], [], [0]
     while range_count:
+        if len(levels) > layout.BVH_MAX_DEPTH:
+            raise _wrong_split(device, f"a tree became deeper than {layout.BVH_MAX_DEPTH} levels")
         capacity = min(leaf_size * 8 ** (layout.BVH_MAX_DEPTH - len(levels)), 0xFFFFFFFF)
         level = _Level(device, range_count, leaf_size)
         level.split(boxes, ranges, capacity)
@@ -101,6 +106,11 @@ def build_boxes(
             splitter = None  # the ranges of further levels are smaller still
         offsets, inner, leaves = level.sum_up()
         node_count += range_count
+        if leaf_size > 1 and pack_count + leaves > MOST_PACKS:
+            raise DeviceError(
+                f"mesh: has more than the {MOST_PACKS:,} packs of triangles that kernels can address; use a "
+                f"smaller mesh"
+            )
         ranges = device.empty(inner * 8)
         nodes.append(level.nodes_array)
         packs.append(level.link(boxes, offsets, node_count, pack_count, leaves, ranges, mesh))
@@ -109,6 +119,10 @@ def build_boxes(
         levels.append(node_count)
     all_nodes = np.concatenate(nodes)
     return Bvh(all_nodes, np.concatenate(packs), tuple(levels), root_bounds(all_nodes))
+
+
+def _wrong_split(device: Device, found: str) -> DeviceError:
+    return DeviceError(f"{device.name} builds trees wrongly: {found}; choose another --device")
 
 
 def _launch(device: Device, name: str, count: int, work_group: int | None = None, **values: Any) -> None:
@@ -255,6 +269,8 @@ class _Splitter:
         axis, position = split
         left = counts[:, axis, :position].sum(axis=1, dtype=np.uint32)
         lower = int(left.sum())
+        if not 0 < lower < part.count:
+            raise _wrong_split(device, f"a split leaves {lower:,} of {part.count:,} boxes on one side")
         before = np.cumsum(left, dtype=np.uint32) - left
         sides = np.stack([part.start + before, lower + chunks[:, 0] - before], axis=1).astype(np.uint32)
         buffers = {"chunks": chunk_buffer, "moved": self.moved}

@@ -96,6 +96,13 @@ class Device:
         return self.is_cpu and (self.is_pocl or "intel" in self.cl_device.platform.name.lower())
 
     @cached_property
+    def divides_exactly(self) -> bool:
+        """Whether quotients and roots are rounded correctly, where programs are built with
+        program.EXACT_DIVISION."""
+        exact = cl.device_fp_config.CORRECTLY_ROUNDED_DIVIDE_SQRT
+        return bool(self.cl_device.single_fp_config & exact)
+
+    @cached_property
     def block_paths(self) -> int | None:
         """How many paths a block takes (arena.py). None: kernels over blocks, which are made for the
         compilers and caches of CPUs, do not run here, or local memory is too small."""
@@ -207,7 +214,8 @@ class Device:
 
     def program_text(self, file: str, features: tuple[str, ...] = ()) -> str:
         """The whole source of the program around the file of cl/ called `file`, as this device builds it."""
-        own = (*self.features, *(("CLANG_CPU",) if self.is_clang_cpu else ()))
+        of_device = {"CLANG_CPU": self.is_clang_cpu, "INEXACT_DIVISION": not self.divides_exactly}
+        own = dict.fromkeys((*self.features, *(name for name, holds in of_device.items() if holds)))
         paths = self.block_paths or arena.BLOCK_SIZES[0]
         return program.program_text(program.files()[file], (*features, *own), self.target, paths)
 
@@ -217,7 +225,11 @@ class Device:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", cl.CompilerWarning)
-                built: cl.Program = cl.Program(self.context, text).build(options=list(program.BUILD_OPTIONS))
+                options = [
+                    *program.BUILD_OPTIONS,
+                    *([program.EXACT_DIVISION] if self.divides_exactly else []),
+                ]
+                built: cl.Program = cl.Program(self.context, text).build(options=options)
                 return built
         except cl.Error as error:
             raise DeviceError(

@@ -17,6 +17,8 @@ from incpt.core import arena, bindings, layout, stages
 # Relaxed arithmetic only where NaN and infinity keep their meaning: -cl-fast-relaxed-math loses rays.
 BUILD_OPTIONS = ("-cl-std=CL1.2", "-cl-mad-enable", "-cl-no-signed-zeros")
 """Options of every build."""
+EXACT_DIVISION = "-cl-fp32-correctly-rounded-divide-sqrt"
+"""The option of builds for devices that can divide exactly, which they need not do without it."""
 
 _LINE = re.compile(r'#line (\d+) "(.*)"$')
 _WHOLE_TEXT = re.compile(r"<kernel>:(\d+):")
@@ -27,6 +29,8 @@ _INCLUDE = re.compile(r'^#include "([\w/]+)\.cl"$', re.MULTILINE)
 FEATURES = {
     "CLANG_CPU": "The compiler is clang for a CPU, whose intrinsics and loop pragmas are at hand.",
     "PORTABLE_LANES": "Instructions of AVX-512 are not written by hand, as on processors without them.",
+    "INEXACT_DIVISION": "The device does not round quotients correctly, so that boxes need more slack.",
+    "PERTURBED_DIVISION": "Reciprocals of directions are two ulps off, for the tests of that slack.",
     "ENVIRONMENT_IMAGE": "The environment is an image, of which lights are sampled.",
     "TRIANGLE_LIGHTS": "There are emissive triangles, of which lights are sampled.",
     "MEDIA": "There are materials that let light through.",

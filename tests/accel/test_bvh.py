@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from incpt.accel import bvh, top_level
 from incpt.core import affine, bindings, layout
-from incpt.core.errors import InputError
+from incpt.core.errors import DeviceError, InputError
 from incpt.core.layout import PathClass, PathPlane, RayPlane, ShadowPlane, SurfacePlane
 from incpt.device.device import Device
 from incpt.scene import model, shapes
@@ -316,6 +316,26 @@ def test_memory_per_triangle(device: Device) -> None:
     assert np.mean(tree.packs["face"] != layout.NO_INDEX) > 0.74
 
 
+def test_a_device_that_splits_wrongly_is_an_error(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = soup(np.random.default_rng(2), 500)
+    with monkeypatch.context() as patch:
+        patch.setattr(layout, "BVH_MAX_DEPTH", 1)
+        with pytest.raises(DeviceError, match="deeper than 1 levels"):
+            bvh.build_mesh(device, mesh)
+    monkeypatch.setattr(bvh, "LARGEST_SERIAL_RANGE", 100)
+    monkeypatch.setattr(bvh, "_cheapest_split", lambda *_: (0, 0))
+    with pytest.raises(DeviceError, match="leaves 0 of 500 boxes"):
+        bvh.build_mesh(device, mesh)
+
+
+def test_more_packs_than_kernels_can_address_are_an_error(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bvh, "MOST_PACKS", 60)
+    with pytest.raises(DeviceError, match="60 packs"):
+        bvh.build_mesh(device, soup(np.random.default_rng(2), 500))
+
+
 @pytest.mark.parametrize("count", [0, 1, 2, 9, 1000])
 def test_top_level_has_every_object_once(device: Device, count: int) -> None:
     rng = np.random.default_rng(count)
@@ -485,6 +505,20 @@ def test_closed_meshes_are_watertight(device: Device, placement: dict[str, objec
     world = World(device, [obj])
     assert world.intersect(origins, directions).hit.all()
     assert (world.occlude(origins, directions, np.inf) == 0).all()
+
+
+def test_no_ray_slips_through_where_reciprocals_are_two_ulps_off() -> None:
+    mesh = shapes.shape("sphere")
+    rng = np.random.default_rng(14)
+    targets = np.concatenate([mesh.vertices] * 10).astype(np.float64)
+    origins = (rng.normal(size=targets.shape) * 0.08).astype(np.float32)
+    directions = directions_to(targets, origins)
+    missed = []
+    for features in (("PERTURBED_DIVISION",), ("PERTURBED_DIVISION", "INEXACT_DIVISION")):
+        world = World(Device(features=features), [as_object(mesh)])
+        missed.append(int((~world.intersect(origins, directions).hit).sum()))
+    assert missed[0] > 0, "this does not need the slack that it tests"
+    assert missed[1] == 0
 
 
 @pytest.mark.parametrize("name", ["cube", "sphere"])
