@@ -30,13 +30,10 @@ INLINE void generate_path(const Params *params, __global const Slot *slots, cons
     p.pixel = pixel;
     p.sample = sample;
     p.bounces = p.passages = p.ray = 0u;
-    MediumStack vacuum;
-#pragma unroll
-    for (uint i = 0u; i < MEDIUM_STACK_SIZE; i++)
-        vacuum.entry[i] = MEDIUM_NONE;
     store_ray(state, path, ray);
     store_path(state, path, &p);
-    store_medium_stack(state, path, &vacuum);
+    store_bits(state->paths, PATH_MEDIUM_0 * STRIDE(state) + path, params->camera_media[0]);
+    store_bits(state->paths, PATH_MEDIUM_1 * STRIDE(state) + path, params->camera_media[1]);
     store_class(state, path, inside_image ? CLASS_LIVE : 0u);
 }
 

@@ -585,6 +585,7 @@ CAMERA = _packed(
 PARAMS = _packed(
     [
         ("camera", CAMERA),
+        ("camera_media", np.uint32, (2,)),  # the media around the camera, as PathPlane.MEDIUM_0 and MEDIUM_1
         ("width", np.uint32),
         ("height", np.uint32),
         ("tile_size", np.uint32),

@@ -35,6 +35,7 @@ def launch_params(params: npt.NDArray[np.void], tables: SceneTables) -> npt.NDAr
     environment, and what the stages of a ray depend on."""
     params, environment = params.copy(), tables.scene.environment
     params["last_ray"] = stages.last_ray(int(params["max_bounces"]), tables.has_media)
+    params["camera_media"] = tables.camera_media
     params["sees_sky"] = any(tables.environment_radiance)
     params["light_count"] = tables.light_count
     params["environment_probability"] = tables.environment_probability

@@ -12,6 +12,7 @@ import pyopencl as cl
 from incpt.core import affine, layout
 from incpt.device.device import Device
 from incpt.scene.change import Change, diff
+from incpt.scene.enclosing import has_in_bounds
 from incpt.scene.model import Object, Scene
 from incpt.tables.light_pairs import has_same_emitters
 
@@ -78,6 +79,8 @@ def difference(old: Scene, new: Scene) -> Difference:
         *_shown(old, _displaced(change) - change.added),
         *_shown(new, _displaced(change) - change.removed),
     ]
+    # Paths start in the media around the camera, whose boundaries they need not meet.
+    placed += [*_changed_around_camera(old, change), *_changed_around_camera(new, change)]
     boxes = np.array([obj.world_bounds for obj in placed]).reshape(-1, 2, 3)
     padding = _PADDING * max((_amplification(obj) for obj in placed), default=1.0)
     differing = not has_same_emitters(old, new)
@@ -91,6 +94,17 @@ def _displaced(change: Change) -> frozenset[str]:
 
 def _shown(scene: Scene, names: frozenset[str]) -> list[Object]:
     return [obj for obj in map(scene.object, sorted(names)) if obj.visible]
+
+
+def _changed_around_camera(scene: Scene, change: Change) -> list[Object]:
+    """The objects with another material in whose boxes the camera is."""
+    return [
+        obj
+        for obj in scene.objects
+        if (obj.material in change.materials or obj.name in change.reassigned)
+        and obj.visible
+        and has_in_bounds(obj, scene.camera.position)
+    ]
 
 
 def _with_other_materials(new: Scene, change: Change) -> npt.NDArray[np.bool_]:

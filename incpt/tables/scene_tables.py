@@ -16,8 +16,11 @@ from weakref import WeakKeyDictionary, WeakValueDictionary
 
 import pyopencl as cl
 
+from incpt.core import layout
 from incpt.core.affine import Vector
 from incpt.scene.change import Change, diff
+from incpt.scene.enclosing import transparent_bodies_around
+from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Scene
 from incpt.tables.environment import EnvironmentTables, environment_tables
@@ -116,12 +119,33 @@ class SceneTables:
         return (0.0, 0.0, 0.0) if black else environment.radiance
 
     @cached_property
+    def camera_media(self) -> tuple[int, int]:
+        """The stack of media around the camera, as the planes MEDIUM_0 and MEDIUM_1 of a path hold it."""
+        scene, numbers = self.scene, {name: i for i, name in enumerate(self.scene.materials)}
+        stack: list[int] = []
+        materials = list(scene.materials.values())
+        if self.has_media:
+            for obj in transparent_bodies_around(scene, scene.camera.position):
+                medium = numbers[obj.material]
+                priority = _rank(materials[medium])
+                below = [i for i, other in enumerate(stack) if _rank(materials[other]) <= priority]
+                stack.insert(below[0] if below else len(stack), medium)
+        stack = [*stack, *[layout.MEDIUM_NONE] * layout.MEDIUM_STACK_SIZE][: layout.MEDIUM_STACK_SIZE]
+        upper, lower = (stack[i] | stack[i + 1] << layout.MEDIUM_HIGH.shift for i in (0, 2))
+        return upper, lower
+
+    @cached_property
     def _is_flat(self) -> bool:
         return all(mesh.normals is None for mesh in self.meshes)
 
     @property
     def _has_image_light(self) -> bool:
         return _has_image_light(self.scene, self.environment)
+
+
+def _rank(material: Material) -> float:
+    """By which media win over each other: see Material."""
+    return material.priority or float("inf")
 
 
 def tables_of(pool: GeometryPool, scene: Scene, previous: SceneTables | None = None) -> SceneTables:
