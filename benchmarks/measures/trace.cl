@@ -18,7 +18,7 @@ STAGE void load_rays(const Block *block, __local float *planes, uint path_class,
 
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
 trace_closest(RAYS_PARAMETERS, BLOCK_PARAMETERS, DISTANCES_PARAMETERS) {
-    const Block block = BLOCK_OF(0, 0, 0, 0, 0, count);
+    const Block block = BLOCK_OF(0, 0, 0, 0, 0, 0, count);
     load_rays(&block, block.state.rays, CLASS_LIVE, count, given);
     trace_nearest(&block, block.size, from_camera != 0);
     for (uint i = 0; i < block.size; i++) {
@@ -31,7 +31,7 @@ trace_closest(RAYS_PARAMETERS, BLOCK_PARAMETERS, DISTANCES_PARAMETERS) {
 // 1 where something is nearer than the limit, else 0.
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void trace_any(RAYS_PARAMETERS, BLOCK_PARAMETERS,
                                                                             DISTANCES_PARAMETERS) {
-    const Block block = BLOCK_OF(0, 0, 0, 0, 0, count);
+    const Block block = BLOCK_OF(0, 0, 0, 0, 0, 0, count);
     const State *state = &block.state;
     load_rays(&block, state->shadows, CLASS_SHADOW, count, given);
     for (uint i = 0; i < block.size; i++) {

@@ -16,7 +16,8 @@ typedef struct {
     __global const uint *places;
     __global float *path_buffer;
     const Changes *changes; // `touched` begins with the first path of the block
-    uint first, size;       // the place of its first path in the path buffer, and how many paths it has
+    __global uint *counters;
+    uint first, size; // the place of its first path in the path buffer, and how many paths it has
     Geometry geometry;
     Shading shading;
     Emitters emitters;
@@ -37,12 +38,13 @@ INLINE uint block_size(uint path_count) {
 }
 
 // The block of a kernel with BLOCK_PARAMETERS.
-#define BLOCK_OF(params, slots, places, path_buffer, changes, path_count)                                    \
+#define BLOCK_OF(params, slots, places, path_buffer, changes, counters, path_count)                          \
     {params,                                                                                                 \
      slots,                                                                                                  \
      places,                                                                                                 \
      path_buffer,                                                                                            \
      changes,                                                                                                \
+     counters,                                                                                               \
      block_first(),                                                                                          \
      block_size(path_count),                                                                                 \
      {GEOMETRY_ARGUMENTS},                                                                                   \

@@ -254,8 +254,11 @@ STAGE void shade_media(const Block *block, const BlockRay *ray) {
     for (int i = first; i < (int)count; i++)
         shade_medium_path(block->params, &block->shading, state, i, load_result(state, i));
     __local const uint *classes = (__local const uint *)state->paths + PATH_CLASS * BLOCK_STRIDE;
-    const Subset subset =
-        subset_where(classes + first, CLASS_SURFACE, count - first, UINT_PLANES(block->memory, SUBSETS));
+    __local uint *words = UINT_PLANES(block->memory, SUBSETS);
+    const uint cut_off = subset_where(classes + first, CLASS_CUT_OFF, count - first, words).count;
+    if (cut_off)
+        atomic_add(&block->counters[COUNTER_CUT_OFF], cut_off);
+    const Subset subset = subset_where(classes + first, CLASS_SURFACE, count - first, words);
     __local uint *list = UINT_PLANES(block->memory, LIST);
     list_subset(list, &subset, first);
     const uint opaque = subset.count;
@@ -351,9 +354,9 @@ INLINE void trace_block(const Block *block) {
 
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
 trace_blocks(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, PLACES_PARAMETERS, BLOCK_PARAMETERS, RADIANCE_PARAMETERS,
-             CHANGES_PARAMETERS) {
+             CHANGES_PARAMETERS, COUNTERS_PARAMETERS) {
     const Changes changes = {change, changed_objects, touched + block_first()};
-    const Block block = BLOCK_OF(&params, slots, places, path_buffer, &changes, params.path_count);
+    const Block block = BLOCK_OF(&params, slots, places, path_buffer, &changes, counters, params.path_count);
     const uint first = block.first, size = block.size;
     trace_block(&block);
     for (uint c = 0; c < 3; c++)

@@ -18,9 +18,10 @@
 // is the path buffer, in which the pass begins at plane `first_plane`. `film` and `pending` have CHANNELS
 // planes of sums, and one of the number of samples. A tile whose repetitions take several steps is kept in
 // `pending` until its last one, so that the film shows finished tiles only. A sample with a float that is not
-// finite counts as zero, and `nonfinite` counts it. Tiles with any of `replace_flags` replace what is in the
+// finite counts as zero, and is counted. Tiles with any of `replace_flags` replace what is in the
 // film, others are added to it.
-__kernel void reduce(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, TRACED_PARAMETERS, REDUCTION_PARAMETERS) {
+__kernel void reduce(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, TRACED_PARAMETERS, COUNTERS_PARAMETERS,
+                     REDUCTION_PARAMETERS) {
     uint tile_pixels = params.tile_size * params.tile_size;
     uint group = (uint)get_global_id(0) / tile_pixels;
     if (group >= group_total)
@@ -53,7 +54,7 @@ __kernel void reduce(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, TRACED_PARAMETERS, RED
             sum[channel] += finite ? SUMMED(value[channel]) : 0.0f;
     }
     if (bad)
-        atomic_add(nonfinite, bad);
+        atomic_add(&counters[COUNTER_NONFINITE], bad);
 
     uint pixels = params.width * params.height;
     uint pixel = y * params.width + x;

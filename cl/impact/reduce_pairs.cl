@@ -28,10 +28,10 @@ enum {
 // where its radiance in the old scene stands among `partner_radiance`: NO_INDEX where it met nothing that
 // changed, so that it is the same; NO_PARTNER where it did, but was not traced there, because its slot is
 // SINGLE. In such a slot no sample counts as a pair: those that met no change are not like the others. A
-// radiance with a float that is not finite counts as black, and `nonfinite` counts it. No pixel may be in two
-// groups of a launch.
-__kernel WIDE void reduce_pairs(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, TRACED_PARAMETERS, PAIRS_PARAMETERS,
-                                OLD_VALUES_PARAMETERS) {
+// radiance with a float that is not finite counts as black, and is counted. No pixel may be in two groups of
+// a launch.
+__kernel WIDE void reduce_pairs(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, TRACED_PARAMETERS, COUNTERS_PARAMETERS,
+                                PAIRS_PARAMETERS, OLD_VALUES_PARAMETERS) {
     const uint runs = (params.tile_size + RUN - 1u) / RUN, item = (uint)get_global_id(0);
     const uint group = item / (params.tile_size * runs);
     if (group >= group_total)
@@ -127,5 +127,5 @@ __kernel WIDE void reduce_pairs(LAUNCH_PARAMETERS, SLOTS_PARAMETERS, TRACED_PARA
     for (size_t i = 0u; i < length; i++)
         bad += sums[BAD_COUNT][i];
     if (bad > 0.0f)
-        atomic_add(nonfinite, (uint)bad);
+        atomic_add(&counters[COUNTER_NONFINITE], (uint)bad);
 }

@@ -104,9 +104,9 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
     uint passages = p.passages + ((!covered) & passage);
     Vec3 carried = mul(throughput, next.weight);
     float survival = survival_probability(carried, p.bounces, params->roulette_depth);
-    int goes_on = possible & (bounces <= params->max_bounces + 1u) &
-                  (passages <= params->transmission_bounces) & (p.ray < MOST_RAYS_IN_MEDIA) &
-                  (largest(carried) > 0.0f) & (luck.u < survival);
+    int survives = possible & (bounces <= params->max_bounces + 1u) & (p.ray < MOST_RAYS_IN_MEDIA) &
+                   (largest(carried) > 0.0f) & (luck.u < survival);
+    int may_pass = passages <= params->transmission_bounces;
     carried = scale(1.0f / survival, carried);
 
     MediumStack after;
@@ -119,7 +119,7 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
     next_ray.origin =
         along(surface.position, reflected ? surface.offset : -surface.offset, surface.geometric);
     next_ray.direction = select(opaque, direction, next_direction);
-    path_class |= goes_on ? CLASS_LIVE : 0u;
+    path_class |= survives ? (may_pass ? CLASS_LIVE : CLASS_CUT_OFF) : 0u;
     p.throughput = select(opaque, throughput, carried);
     p.bsdf_pdf = opaque ? p.bsdf_pdf : next.pdf;
     p.bounces = opaque ? p.bounces : bounces;
@@ -141,13 +141,16 @@ INLINE void absorb_light(const Shading *shading, const State *state, uint path) 
 }
 
 #ifndef BLOCKS
-__kernel void shade_medium(LAUNCH_PARAMETERS, LIST_PARAMETERS, SHADING_PARAMETERS, PATH_STATE_PARAMETERS) {
+__kernel void shade_medium(LAUNCH_PARAMETERS, LIST_PARAMETERS, SHADING_PARAMETERS, PATH_STATE_PARAMETERS,
+                           COUNTERS_PARAMETERS) {
     if (get_global_id(0) >= lengths[length_place])
         return;
     const State state = STATE_OF(params);
     const Shading shading = {SHADING_ARGUMENTS};
     const WorkItem item = listed_path(&params, lengths[length_place], list);
     shade_medium_path(&params, &shading, &state, item.path, item.result);
+    if (load_class(&state, item.path) == CLASS_CUT_OFF)
+        atomic_add(&counters[COUNTER_CUT_OFF], 1u);
 #ifdef LIGHT_SAMPLING
     if (load_class(&state, item.path) == CLASS_SURFACE)
         absorb_light(&shading, &state, item.path);

@@ -20,7 +20,7 @@ from incpt.cli.options import (
     settings_from,
 )
 from incpt.core.errors import InputError, OutputError
-from incpt.core.settings import STRATEGIES
+from incpt.core.settings import CUT_OFF_WORTH_TELLING, STRATEGIES
 
 if TYPE_CHECKING:
     from incpt.render.session import StepReport
@@ -60,12 +60,14 @@ def render(
         settings = replace(settings, aovs=True)
     session = Session(scene, settings=settings, device=device)
     pixels = padded_pixels(settings)
-    nonfinite = 0
+    nonfinite = paths = cut_off = 0
     with interruption() as stop, path_progress("rendering", spp * pixels, pixels) as progress:
 
         def on_step(report: StepReport) -> None:
-            nonlocal nonfinite
+            nonlocal nonfinite, paths, cut_off
             nonfinite += report.nonfinite
+            paths += report.paths
+            cut_off += report.cut_off
             progress.advance(report.paths)
             stop.check()
 
@@ -79,6 +81,9 @@ def render(
     samples = int(session.spp().min())
     if nonfinite:
         complain(f"warning: {nonfinite:,} samples were not finite and count as black", 0)
+    if cut_off > CUT_OFF_WORTH_TELLING * paths:
+        share = 100 * cut_off / paths
+        complain(f"warning: {share:.1f} % of the paths ended in glass; raise transmission_bounces", 0)
     print(f"{output}: {session.size[0]} x {session.size[1]}, {samples} samples per pixel")
     if stop.requested:
         raise Stopped(f"stopped at {samples} of {spp} samples per pixel")

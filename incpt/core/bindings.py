@@ -215,9 +215,10 @@ TRACED = Group(
         _count("group_total", "how many groups of slots there are"),
         _table("groups", "uint", "the first slot of each group"),
         _table("samples", "float", "the path buffer: a plane for each channel of each pass"),
-        Argument("nonfinite", "__global uint *", "counts samples with a float that is not finite"),
     ),
 )
+
+COUNTERS = Group("COUNTERS", None, (Argument("counters", "__global uint *", "Counter"),))
 
 REDUCTION = Group(
     "REDUCTION",
@@ -463,9 +464,9 @@ REFITTING = Group(
 
 GROUPS = (
     LAUNCH, SLOTS, PLACES, LIST, GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE, PATH_STATE, COMPACTION,
-    BLOCK_MEMORY, RADIANCE, CHANGES, PARTNERS, FIRST_HITS, TRACED, REDUCTION, RESOLUTION, PICTURE, PAIRS,
-    OLD_VALUES, LABELS, NORMALS, GUIDES, TILE_COLUMNS, COLUMN_SUMS, CELL_SUMS, CELLS, RULES, COLUMN_RULES,
-    SPREADING, SPANS, SLOPES, SCALE, HALVES, SMOOTH_HALVES, DETAILS, EVIDENCE, CELL_EVIDENCE,
+    BLOCK_MEMORY, RADIANCE, CHANGES, PARTNERS, FIRST_HITS, TRACED, COUNTERS, REDUCTION, RESOLUTION, PICTURE,
+    PAIRS, OLD_VALUES, LABELS, NORMALS, GUIDES, TILE_COLUMNS, COLUMN_SUMS, CELL_SUMS, CELLS, RULES,
+    COLUMN_RULES, SPREADING, SPANS, SLOPES, SCALE, HALVES, SMOOTH_HALVES, DETAILS, EVIDENCE, CELL_EVIDENCE,
     POOLED_EVIDENCE, COLUMN_EVIDENCE, BASE, SHOWN_IMAGE, SHOWN_SHARES,
     ITEMS, MESH, BOXES, CHUNKS, MEASURES, BINS, SIDES, MOVED, LEVEL, SPLITTING, LINKING, LEAVES, REFITTING,
 )  # fmt: skip
@@ -480,20 +481,20 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     "intersect": (LAUNCH, LIST, GEOMETRY, SHADING, PATH_STATE),
     "sample_lights": (LAUNCH, LIST, EMITTERS, PATH_STATE),
     "shade": (LAUNCH, LIST, SHADING, PATH_STATE),
-    "shade_medium": (LAUNCH, LIST, SHADING, PATH_STATE),
+    "shade_medium": (LAUNCH, LIST, SHADING, PATH_STATE, COUNTERS),
     "shade_miss": (LAUNCH, LIST, SHADING, EMITTERS, PATH_STATE),
     "trace_shadow": (LAUNCH, LIST, GEOMETRY, PATH_STATE),
     "write_aovs": (LAUNCH, LIST, SHADING, PATH_STATE),
     "touch_rays": (LAUNCH, LIST, PATH_STATE, CHANGES),
     "touch_lights": (LAUNCH, LIST, SHADING, EMITTERS, PATH_STATE, CHANGES),
     "touch_shadow_rays": (LAUNCH, LIST, PATH_STATE, CHANGES),
-    "trace_blocks": (LAUNCH, SLOTS, PLACES, *BLOCK, RADIANCE, CHANGES),
+    "trace_blocks": (LAUNCH, SLOTS, PLACES, *BLOCK, RADIANCE, CHANGES, COUNTERS),
     "count_partners": (LAUNCH, SLOTS, PARTNERS),
     "list_partners": (LAUNCH, SLOTS, PARTNERS),
     "first_hits": (LAUNCH, SHADING, PATH_STATE, FIRST_HITS),
-    "reduce": (LAUNCH, SLOTS, TRACED, REDUCTION),
+    "reduce": (LAUNCH, SLOTS, TRACED, COUNTERS, REDUCTION),
     "resolve": (RESOLUTION,),
-    "reduce_pairs": (LAUNCH, SLOTS, TRACED, PAIRS, OLD_VALUES),
+    "reduce_pairs": (LAUNCH, SLOTS, TRACED, COUNTERS, PAIRS, OLD_VALUES),
     "weigh_guides": (PICTURE, LABELS, NORMALS, GUIDES),
     "measure_cells": (PICTURE, PAIRS, LABELS, CELL_SUMS),
     "pool_cells": (PICTURE, CELL_SUMS, CELLS, RULES),

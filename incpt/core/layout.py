@@ -378,6 +378,16 @@ class PathClass(IntFlag):
     SURFACE = 4
     MEDIUM = 8
     MISS = 16
+    CUT_OFF = 32
+    """Nothing: the path ended because it had no passages through glass left."""
+
+
+class Counter(IntEnum):
+    """What kernels count of the paths of a step: samples with a float that is not finite; paths that ended
+    because `transmission_bounces` was used up, though they still carried something."""
+
+    NONFINITE = 0
+    CUT_OFF = 1
 
 
 class PathList(IntEnum):
@@ -699,6 +709,7 @@ def c_header() -> str:
         (HalfPlane, "HALF"),
         (Evidence, "EVIDENCE"),
         (PathClass, "CLASS"),
+        (Counter, "COUNTER"),
         (SlotFlag, "SLOT"),
         (MaterialFlag, "MATERIAL"),
     ):

@@ -23,7 +23,8 @@ class RenderSettings:
 
     size                  width and height of the image, pixels.
     max_bounces           scattering events after the first hit; 0 is direct light only.
-    transmission_bounces  passages through smooth dielectrics, counted apart.
+    transmission_bounces  passages through smooth dielectrics, counted apart. Where none are left a path
+                          ends, and its light is lost; `StepReport.cut_off` counts these.
     roulette_depth        scattering events before Russian roulette may end a path.
     multiple_scattering   whether light that meets several microfacets of rough metal goes on; else it is
                           lost, as in renderers that scatter once.
@@ -109,6 +110,9 @@ def _whole_pair(value: Any) -> tuple[int, int]:
     limit = math.isqrt(MAX_IMAGE_PIXELS) * 4
     return whole("size (width)", width, 1, limit), whole("size (height)", height, 1, limit)
 
+
+CUT_OFF_WORTH_TELLING = 1e-3
+"""The share of paths that end because `transmission_bounces` is used up from which people are told."""
 
 PICTURE_SETTINGS = (
     *("max_bounces", "transmission_bounces", "roulette_depth", "multiple_scattering", "seed"),

@@ -36,6 +36,7 @@ class Batch:
     path_count   how many paths these are; tracing takes no others of `slots`.
     path_buffer  planes of params["buffer_stride"] floats, which get what each path brings: those of radiance
                  in layout.SamplePlane, with `aovs` all of them.
+    counters     uints on the device, one for each layout.Counter, to which tracing adds.
     aovs         whether auxiliary images are part of it.
     places       uints on the device: which of the paths of `slots` these are. Path number k of the list is
                  number k of the path buffer. None: the first ones.
@@ -47,6 +48,7 @@ class Batch:
     slots: cl.Buffer
     path_count: int
     path_buffer: cl.Buffer
+    counters: cl.Buffer
     aovs: bool = False
     places: cl.Buffer | None = None
     touch_test: TouchTest | None = None
@@ -63,6 +65,7 @@ class Batch:
         test, unused = self.touch_test, self.slots
         return {
             "slots": self.slots,
+            "counters": self.counters,
             "places": unused if self.places is None else self.places,
             "change": np.zeros((), layout.CHANGE) if test is None else test.changes.change,
             "changed_objects": unused if test is None else test.changes.objects,

@@ -21,7 +21,7 @@ import numpy.typing as npt
 import pyopencl as cl
 
 from incpt.core import bindings
-from incpt.core.layout import SlotFlag
+from incpt.core.layout import Counter, SlotFlag
 from incpt.device.device import BUILD_SIZES, Device
 from incpt.render.plan import Plan
 from incpt.render.tiles import TileGrid
@@ -117,8 +117,8 @@ class Film:
         self.device, self.width, self.height, self.passes = device, width, height, passes
         self.revision = 0
         """Another number whenever sums changed, so that what was made of them need not be made twice."""
-        self._nonfinite = device.empty(4)
-        device.fill(self._nonfinite, 0, 4)
+        self._counters = device.empty(4 * len(Counter))
+        device.fill(self._counters, 0, 4 * len(Counter))
         first_planes = accumulate((one.channels for one in passes), initial=0)
         self._layers = {
             one.name: _Layer(device, one, first, width * height)
@@ -179,32 +179,32 @@ class Film:
             "group_total": len(groups),
             "groups": self.device.upload(groups),
             "samples": samples,
-            "nonfinite": self._nonfinite,
+            "counters": self._counters,
         }
         for one in self.passes if passes is None else passes:
             self._layers[one.name].reduce(size, **values)
 
     @property
-    def nonfinite(self) -> cl.Buffer:
-        """Where kernels count samples that are not finite."""
-        return self._nonfinite
+    def counters(self) -> cl.Buffer:
+        """What kernels count, a uint for each layout.Counter."""
+        return self._counters
 
     def first_plane(self, name: str) -> int:
         """Where the planes of a pass begin in the path buffer."""
         return int(self._layers[name].first_plane)
 
-    def take_nonfinite(self) -> int:
-        """Samples that were not finite since the last call; they count as black."""
-        count = int(self.device.read(self._nonfinite, np.empty(1, np.uint32))[0])
-        if count:
-            self.device.fill(self._nonfinite, 0, 4)
-        return count
+    def take_counters(self) -> dict[Counter, int]:
+        """What was counted since the last call. Samples that are not finite count as black."""
+        counts = self.device.read(self._counters, np.empty(len(Counter), np.uint32))
+        if counts.any():
+            self.device.fill(self._counters, 0, counts.nbytes)
+        return {counter: int(counts[counter]) for counter in Counter}
 
     def idle_launches(self, params: npt.NDArray[np.void], samples: cl.Buffer) -> list[Callable[[], None]]:
         """The launches of the film's kernels, each with nothing to do; see `Device.built`."""
-        none = self._nonfinite
+        none = self._counters
         values = {"params": params, "slots": none, "group_total": 0, "groups": none}
-        values |= {"samples": samples, "nonfinite": none}
+        values |= {"samples": samples, "counters": none}
         launches: list[Callable[[], None]] = []
         for layer in self._layers.values():
             launches += [partial(layer.reduce, size, **values) for size in BUILD_SIZES]

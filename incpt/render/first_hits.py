@@ -109,7 +109,9 @@ def _traced(
     params["buffer_stride"] = paths + layout.WORK_GROUP_SIZE
     surface, object_ids = device.empty(4 * _SURFACE_PLANES * pixels), device.empty(4 * pixels)
     radiance = device.empty(12 * (paths + layout.WORK_GROUP_SIZE))
-    tracer.first_hits(Batch(tables, params, device.upload(slots), paths, radiance), surface, object_ids)
+    counters = device.empty(4 * len(layout.Counter))
+    batch = Batch(tables, params, device.upload(slots), paths, radiance, counters)
+    tracer.first_hits(batch, surface, object_ids)
     return (
         device.read(surface, np.empty(_SURFACE_PLANES * pixels, np.float32)),
         device.read(object_ids, np.empty(pixels, np.int32)),

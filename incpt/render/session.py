@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from incpt.core.checks import pair, require, require_bool, require_call, whole
 from incpt.core.errors import InputError
+from incpt.core.layout import Counter
 from incpt.core.settings import RenderSettings
 from incpt.device.device import Device
 from incpt.render import first_hits, tiles
@@ -47,7 +48,8 @@ class StepReport:
     """What a step did: its mode, the tiles it finished, the place in the queue after it (in tiles), the
     paths it traced of the scene as it is now (those past the image's edge included) and of the scene that it
     is compared with (their partners), its duration in seconds, how many samples were not finite (they count
-    as black), and whether the picture shows anything of it."""
+    as black), how many of `paths` ended because `transmission_bounces` was used up though they still carried
+    something, which is lost, and whether the picture shows anything of it."""
 
     mode: Mode
     tiles: npt.NDArray[np.int32]
@@ -57,6 +59,7 @@ class StepReport:
     partners: int
     seconds: float
     nonfinite: int
+    cut_off: int
     is_shown: bool
 
 
@@ -191,7 +194,7 @@ class Session:
         batch = self._batch(plan.slots, path_buffer)
         step = Step(self._tracer, batch, plan, comparison, path_buffer.pairs)
         partners = strategy_of(settings).render(step, film)
-        nonfinite = film.take_nonfinite()
+        counted = film.take_counters()
         progress = before.after_step(plan, self.scene, self._state.measured)
         self._state = replace(self._state, progress=progress, path_buffer=path_buffer)
         seconds = time.perf_counter() - start
@@ -204,7 +207,8 @@ class Session:
             paths=batch.path_count,
             partners=partners,
             seconds=seconds,
-            nonfinite=nonfinite,
+            nonfinite=counted[Counter.NONFINITE],
+            cut_off=counted[Counter.CUT_OFF],
             is_shown=comparison is not None or len(plan.finished) > 0,
         )
 
@@ -504,7 +508,8 @@ class Session:
         params = path_params(self._tables, settings)
         params["buffer_stride"] = path_buffer.stride
         paths, filled = len(slots) * settings.tile_size**2, self.device.upload(slots)
-        return Batch(self._tables, params, filled, paths, path_buffer.floats, settings.aovs)
+        floats, counters = path_buffer.floats, self._state.film.counters
+        return Batch(self._tables, params, filled, paths, floats, counters, settings.aovs)
 
 
 def _point(pixel: tuple[float, float] | None) -> tuple[float, float] | None:

@@ -16,6 +16,7 @@ rules can be tested without a device:
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,6 +68,8 @@ class Side:
                  whole one.
     seconds      rendering time since the last change.
     nonfinite    samples since the last change that were not finite.
+    paths        paths since the last change, of which `cut_off` ended because they had no passages through
+                 glass left.
     replaced     (grid.count,) the tiles that are finished since the last change.
     version      goes up whenever the picture shows something new.
     urgent       the last version that is to be shown at once.
@@ -87,6 +90,8 @@ class Side:
     is_answered: bool = False
     seconds: float = 0.0
     nonfinite: int = 0
+    paths: int = 0
+    cut_off: int = 0
     version: int = 1
     urgent: int = 1
     pass_paths: int = 0
@@ -208,6 +213,11 @@ def may_change(side: Side, view: View, now: float) -> bool:
 def rests(side: Side, now: float) -> bool:
     """Whether nothing has changed for a while, or the drag has ended."""
     return now - side.changed_at >= REST_SECONDS
+
+
+def share_cut_off(sides: Sequence[Side]) -> float:
+    """Which part of the paths since the last change had no passages through glass left."""
+    return sum(side.cut_off for side in sides) / max(sum(side.paths for side in sides), 1)
 
 
 def is_done(side: Side, target_spp: int | None) -> bool:
@@ -387,7 +397,8 @@ def returned_to_full(side: Side, progress: Progress) -> Side:
 
 def restarted(side: Side, progress: Progress) -> Side:
     """The side after its session began something new."""
-    side = replace(side, seconds=0.0, nonfinite=0, is_answered=False, pass_paths=0, pass_seconds=0.0)
+    side = replace(side, seconds=0.0, nonfinite=0, paths=0, cut_off=0)
+    side = replace(side, is_answered=False, pass_paths=0, pass_seconds=0.0)
     return _forgot_tiles(side, progress)
 
 
@@ -418,6 +429,8 @@ def stepped(side: Side, report: StepReport, seconds: float, progress: Progress) 
         is_answered=is_answered,
         seconds=side.seconds + seconds,
         nonfinite=side.nonfinite + report.nonfinite,
+        paths=side.paths + report.paths,
+        cut_off=side.cut_off + report.cut_off,
         version=version,
         urgent=urgent,
         pass_paths=pass_paths,

@@ -88,6 +88,8 @@ class Frame:
     first_hits   those of a picture of the view's size, or smaller while changes stream in; None: not there
                  yet, or not wanted.
     nonfinite    samples since the last change of the scene that were not finite and count as black.
+    cut_off      the share of the paths since then that ended because `transmission_bounces` was used up,
+                 though they still carried something.
     resting      paused, or the target is reached: nothing is under way.
     is_pinned    there is a reference to compare with, or there will be once the picture is whole.
     """
@@ -100,5 +102,6 @@ class Frame:
     device: str
     first_hits: FirstHits | None
     nonfinite: int
+    cut_off: float
     resting: bool
     is_pinned: bool = False

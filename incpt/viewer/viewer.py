@@ -296,6 +296,7 @@ class Viewer:
             device=self.device.name,
             first_hits=self._hits.first_hits if view.first_hits else None,
             nonfinite=sum(side.nonfinite for side in self._state.sides),
+            cut_off=scheduler.share_cut_off(self._state.sides),
             resting=resting,
             is_pinned=self._reference is not None or self._is_pinning,
         )

@@ -307,7 +307,7 @@ def test_faces_without_area_are_left_out(device: Device) -> None:
 _KERNEL = """
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) WIDE void
 surfaces_of_rays(const uint count, __global const float *given, BLOCK_PARAMETERS, __global float *planes) {
-    const Block block = BLOCK_OF(0, 0, 0, 0, 0, count);
+    const Block block = BLOCK_OF(0, 0, 0, 0, 0, 0, count);
     for (uint i = 0; i < block.size; i++) {
         for (uint p = 0; p < RAY_PLANES; p++)
             block.state.rays[p * BLOCK_STRIDE + i] = given[p * count + block.first + i];

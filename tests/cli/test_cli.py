@@ -186,6 +186,20 @@ def test_samples_that_are_not_finite_are_told(
     assert "14 samples were not finite" in only_line(capsys.readouterr().err)
 
 
+@pytest.mark.parametrize(("passages", "is_told"), [(0, True), (12, False)])
+def test_paths_that_ended_in_glass_are_told(
+    passages: int, is_told: bool, scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    glass = SCENE.replace("max_bounces = 1", f"max_bounces = 1\ntransmission_bounces = {passages}")
+    scene_file.write_text(glass.replace("base_color = [0.8, 0.1, 0.1]", "transmission = 1\nroughness = 0"))
+    assert run("render", scene_file, "-o", tmp_path / "out.png", "--spp", 2) == 0
+    told = capsys.readouterr().err
+    if is_told:
+        assert "% of the paths ended in glass; raise transmission_bounces" in only_line(told)
+    else:
+        assert told == ""
+
+
 def test_the_bar_shows_rate_and_samples(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1")  # rich takes it for a terminal
     with path_progress("rendering", 1000, 100) as progress:

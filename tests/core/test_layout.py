@@ -63,6 +63,7 @@ def test_constants_and_planes_are_in_the_header() -> None:
         layout.ShadowPlane,
         layout.LightPlane,
         layout.PathList,
+        layout.Counter,
         layout.PairPlane,
         layout.CellSum,
         layout.CellPlane,

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from incpt.core import layout
+from incpt.core.layout import Counter
 from incpt.device.device import Device
 from incpt.render.film import RADIANCE, Accumulation, Film, FilmPass, Resolution, plane_count
 from incpt.render.plan import Cursor, Queue, is_done, plan_step
@@ -116,7 +117,8 @@ def test_what_is_not_finite_counts_as_zero_in_its_own_pass(device: Device) -> No
 
     paths = Broken(device, PASSES)
     paths.render(Queue.even(base_queue(GRID), 2, replaces=True), 50)
-    assert paths.film.take_nonfinite() == 2 and paths.film.take_nonfinite() == 0
+    assert paths.film.take_counters() == {Counter.NONFINITE: 2, Counter.CUT_OFF: 0}
+    assert not any(paths.film.take_counters().values())
     whole = MadeUpPaths(device, PASSES)
     whole.render(Queue.even(base_queue(GRID), 2, replaces=True), 50)
     sums, expected = paths.film.sums(), whole.film.sums()

@@ -351,7 +351,7 @@ def frame_of(view: View, mode: Mode = Mode.REFINE, spp: int = 4, error: float | 
         strategy=view.scene.settings.strategy,
     )
     pictures = (replace(picture, strategy="restart"), picture) if view.split else (picture,)
-    return Frame(view, pictures, False, 0.02, 1e6, "a device", None, 0, False)
+    return Frame(view, pictures, False, 0.02, 1e6, "a device", None, 0, 0.0, False)
 
 
 def tell(user: Desk, *messages: Message) -> None:

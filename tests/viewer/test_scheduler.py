@@ -70,7 +70,16 @@ def state(view: View, *sides: Side, spent: tuple[float, ...] | None = None, now:
 def report_of(side: Side, tiles: list[int], done: int, paths: int = 64) -> StepReport:
     length = len(side.progress.queue.tiles)
     return StepReport(
-        side.progress.mode, np.array(tiles, np.int32), done, length, paths, 0, 0.0, 0, is_shown=len(tiles) > 0
+        side.progress.mode,
+        np.array(tiles, np.int32),
+        done,
+        length,
+        paths,
+        0,
+        0.0,
+        0,
+        0,
+        is_shown=len(tiles) > 0,
     )
 
 
@@ -197,6 +206,17 @@ def test_the_end_of_a_drag_does_not_wait_for_rest() -> None:
     side = scheduler.followed(side, work, side.progress, NOW)
     assert side.changed_at == -math.inf and side.is_answered
     assert isinstance(scheduler.next_work(state(side.view, side)), ReturnToFull)
+
+
+def test_paths_that_ended_in_glass_are_counted_since_the_last_change() -> None:
+    side = side_of(view_of(mixed_scene()))
+    assert scheduler.share_cut_off((side,)) == 0
+    for cut_off in (6, 9):
+        report = replace(report_of(side, [], 3), cut_off=cut_off, partners=50)
+        side = scheduler.stepped(side, report, 0.1, side.progress)
+    assert scheduler.share_cut_off((side,)) == 15 / 128
+    assert scheduler.share_cut_off((side, side)) == scheduler.share_cut_off((side,))
+    assert scheduler.share_cut_off((scheduler.restarted(side, side.progress),)) == 0
 
 
 def test_a_change_is_begun_unless_it_changes_nothing() -> None:

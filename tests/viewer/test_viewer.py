@@ -336,6 +336,14 @@ def test_size_that_memory_does_not_hold_is_told_after_the_preview(
     assert end.view.scene == scene
 
 
+def test_frames_tell_which_part_of_the_paths_ended_in_glass(make_viewer: MakeViewer) -> None:
+    for passages, is_some in ((0, True), (40, False)):
+        view = view_of(mixed_scene(transmission_bounces=passages), target_spp=2)
+        viewer, _ = make_viewer(view)
+        frame = frames_until_rest(viewer, view)[-1]
+        assert 0 <= frame.cut_off < 0.2 and (frame.cut_off > 0.01) == is_some
+
+
 def test_paused_view_takes_edits_and_renders_nothing(make_viewer: MakeViewer, device: Device) -> None:
     scene = mixed_scene()
     viewer, clock = make_viewer(view_of(scene, target_spp=2), speed=FAST)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from incpt.core.settings import STRATEGIES, RenderSettings
+from incpt.core.settings import CUT_OFF_WORTH_TELLING, STRATEGIES, RenderSettings
 from incpt.render.modes import Mode
 from incpt.render.strategies import strategy_of
 from incpt.ui.editor.state import Control
@@ -34,6 +34,7 @@ _FOUND_TIP = (
     "What is left is the error of the change that the eye can see. At 100 % the picture is as good as before "
     "the edit"
 )
+_CUT_OFF_TIP = "Their light is missing; raise Glass bounces"
 _ADAPTS_TIP = "NoR is the most: tiles get what the rest of the picture has, and the object's come at once"
 _WITHOUT_NOR = "The strategy that is chosen repeats no tiles"
 _TILE_SIZES = (8, 16, 32, 64, 128)
@@ -55,6 +56,8 @@ def draw_state(frame: Frame | None) -> None:
     widgets.value_row("Step", f"{frame.step_seconds * 1e3:.1f} ms")
     if frame.nonfinite:
         widgets.value_row("Not finite", f"{frame.nonfinite:,} samples", "They count as black")
+    if frame.cut_off > CUT_OFF_WORTH_TELLING:
+        widgets.value_row("Ended in glass", f"{100 * frame.cut_off:.1f} % of the paths", _CUT_OFF_TIP)
 
 
 def found_text(picture: Picture) -> str | None:

@@ -33,12 +33,14 @@ class PairBuffers:
     partners          uint of each partner: the place of its path in the path buffer.
     partner_counts    uint of each layout.COMPACT_BLOCK paths: partners before them.
     partner_radiance  what each partner brought: red, green and blue, planes of `stride` floats.
+    counters          what is counted while partners are traced, apart: it says nothing of the new scene.
     """
 
     partner_place: cl.Buffer
     partners: cl.Buffer
     partner_counts: cl.Buffer
     partner_radiance: cl.Buffer
+    counters: cl.Buffer
     stride: int
 
     @classmethod
@@ -48,10 +50,11 @@ class PairBuffers:
         if old is not None and old.stride >= stride:
             return old
         blocks = -(-stride // layout.COMPACT_BLOCK)
-        place, partners, counts, radiance = (
-            device.empty(4 * count) for count in (stride, stride, blocks, 3 * stride)
+        place, partners, counts, radiance, counters = (
+            device.empty(4 * count) for count in (stride, stride, blocks, 3 * stride, len(layout.Counter))
         )
-        return cls(place, partners, counts, radiance, stride)
+        device.fill(counters, 0, counters.size)
+        return cls(place, partners, counts, radiance, counters, stride)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +126,7 @@ def _partners(batch: Batch, old: SceneTables, buffers: PairBuffers, count: int) 
         params=_with_stride(batch.params, buffers.stride),
         path_count=count,
         path_buffer=buffers.partner_radiance,
+        counters=buffers.counters,
         aovs=False,
         places=buffers.partners,
     )

@@ -63,7 +63,7 @@ def reduce_pairs(film: Film, batch: Batch, slots: npt.NDArray[np.void], old: Old
 
 def idle_launches(film: Film, batch: Batch, old: OldValues) -> list[Callable[[], None]]:
     """The launches of the kernel, with nothing to do; see `Device.built`."""
-    return [partial(_launch, film, batch, old, film.nonfinite, 0, size) for size in BUILD_SIZES]
+    return [partial(_launch, film, batch, old, film.counters, 0, size) for size in BUILD_SIZES]
 
 
 def _launch(film: Film, batch: Batch, old: OldValues, groups: cl.Buffer, count: int, size: int) -> None:
@@ -73,7 +73,7 @@ def _launch(film: Film, batch: Batch, old: OldValues, groups: cl.Buffer, count: 
         "group_total": count,
         "groups": groups,
         "samples": batch.path_buffer,
-        "nonfinite": film.nonfinite,
+        "counters": film.counters,
         "anchor_sums": film.radiance_sums(),
         "pairs": film.planes(PAIR_SUMS),
         "partner_of_path": old.partner_place,

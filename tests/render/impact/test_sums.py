@@ -11,7 +11,7 @@ import pytest
 from render.impact import reference
 
 from incpt.core import layout
-from incpt.core.layout import PairPlane, SlotFlag
+from incpt.core.layout import Counter, PairPlane, SlotFlag
 from incpt.device.device import Device
 from incpt.render.batch import Batch
 from incpt.render.film import RADIANCE, Film
@@ -64,7 +64,7 @@ class MadeUpPaths:
         params["width"], params["height"], params["tile_size"] = WIDTH, HEIGHT, TILE
         params["in_squares"], params["buffer_stride"] = self.in_squares, total
         samples = upload(np.ascontiguousarray(new.T.astype(np.float32)))
-        batch = Batch(None, params, upload(slots), total, samples)  # type: ignore[arg-type]
+        batch = Batch(None, params, upload(slots), total, samples, self.film.counters)  # type: ignore[arg-type]
         reduce_pairs(self.film, batch, slots, values)
         return self._add(slots, new.astype(np.float32), old.astype(np.float32), touched, bad, single)
 
@@ -123,7 +123,7 @@ def test_sums_equal_the_reference(device: Device, in_squares: bool) -> None:
     for _ in range(2):
         paths.step(STEP)
     np.testing.assert_allclose(paths.planes(), paths.state.planes(), rtol=1e-5, atol=1e-5)
-    assert paths.film.take_nonfinite() == 0
+    assert paths.film.take_counters()[Counter.NONFINITE] == 0
     counts = paths.planes()[PairPlane.SAMPLES_0 : PairPlane.PAIRS_1 + 1].sum((1, 2))
     assert (counts[:2] > counts[2:]).all()  # some had no partner
 
@@ -131,7 +131,7 @@ def test_sums_equal_the_reference(device: Device, in_squares: bool) -> None:
 def test_what_is_not_finite_counts_as_black_in_each_scene(device: Device) -> None:
     paths = MadeUpPaths(device)
     broken = paths.step(STEP, broken=0.2)
-    assert broken > 20 and paths.film.take_nonfinite() == broken
+    assert broken > 20 and paths.film.take_counters()[Counter.NONFINITE] == broken
     assert np.isfinite(paths.planes()).all()
     np.testing.assert_allclose(paths.planes(), paths.state.planes(), rtol=1e-5, atol=1e-5)
 
@@ -218,7 +218,7 @@ def test_idle_launches_leave_the_sums_alone(device: Device) -> None:
     params = np.zeros((), layout.PARAMS)
     params["tile_size"] = TILE
     nothing = device.empty(4)
-    batch = Batch(None, params, nothing, 0, nothing)  # type: ignore[arg-type]
+    batch = Batch(None, params, nothing, 0, nothing, nothing)  # type: ignore[arg-type]
     for launch in idle_launches(paths.film, batch, Values(nothing, nothing, 0)):
         launch()
     np.testing.assert_array_equal(paths.planes(), before)
