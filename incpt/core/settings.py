@@ -111,7 +111,7 @@ def _whole_pair(value: Any) -> tuple[int, int]:
     return whole("size (width)", width, 1, limit), whole("size (height)", height, 1, limit)
 
 
-CUT_OFF_WORTH_TELLING = 1e-3
+CUT_OFF_WORTH_TELLING = 1e-2
 """The share of paths that end because `transmission_bounces` is used up from which people are told."""
 
 PICTURE_SETTINGS = (

@@ -12,6 +12,6 @@ def test_paths_that_ended_in_glass_are_told_where_they_are_many() -> None:
     with desk(mixed_scene(size=(48, 32))) as user:
         user.panel("Render")
         frame = frame_of(user.editor.view)
-        for share, is_told in ((0.0, False), (0.0009, False), (0.032, True), (0.0, False)):
+        for share, is_told in ((0.0, False), (0.009, False), (0.032, True), (0.0, False)):
             tell(user, replace(frame, cut_off=share))
             assert user.shows("Speed") and user.shows("Ended in glass") == is_told
