@@ -393,7 +393,7 @@ def small_scenes(draw: st.DrawFn) -> Scene:
                 (0.6 * x, 1 + 0.6 * y, 0.6 * z),
                 draw(st.tuples(*[st.integers(-90, 90)] * 3)),
                 # No two have a face in one plane, see "copy" below.
-                (0.5 + 0.3 * draw(_NUMBERS), 0.4 + 0.013 * i, 0.5 + 0.017 * i),
+                (0.5 + 0.011 * i + 0.3 * draw(_NUMBERS), 0.4 + 0.013 * i, 0.5 + 0.017 * i),
             )
         )
     settings = RenderSettings(size=(24, 24), tile_size=8, max_bounces=2)
