@@ -12,7 +12,8 @@ import numpy.typing as npt
 from incpt.core.arrays import frozen, numbers
 from incpt.core.checks import require
 from incpt.core.errors import InputError
-from incpt.scene.checks import LARGEST
+from incpt.scene.checks import LARGEST, is_list
+from incpt.scene.texture import UV_SETS
 
 
 @dataclass(frozen=True)
@@ -31,8 +32,17 @@ class MeshSource:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles in object space: `vertices` (V, 3) float32, `faces` (F, 3) int32 counter-clockwise from
-    outside, `normals` (F, 3, 3) float32 unit shading normals per corner, or None for flat faces.
+    """Triangles in object space, and what they have at their corners.
+
+    vertices  (V, 3) float32
+    faces     (F, 3) int32, counter-clockwise from outside
+    normals   (F, 3, 3) float32 unit shading normals, or None for flat faces
+    uvs       up to two sets of texture coordinates, (F, 3, 2) float32 each; (0, 0) is the top left corner of
+              an image, see Texture
+    colors    (F, 3, 4) float32 linear red, green, blue and alpha from 0 to 1, which base colours are
+              multiplied with, or None
+    tangents  (F, 3, 4) float32 unit tangents, along which u grows, and the side on which v does (1: that of
+              normal x tangent; -1), or None: they are computed where normal maps need them (`tangents.py`)
 
     Compared by identity: objects that share one Mesh share its BVH.
     """
@@ -41,6 +51,9 @@ class Mesh:
     faces: npt.NDArray[np.int32]
     normals: npt.NDArray[np.float32] | None = None
     source: MeshSource = MeshSource()
+    uvs: tuple[npt.NDArray[np.float32], ...] = ()
+    colors: npt.NDArray[np.float32] | None = None
+    tangents: npt.NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:
         vertices = frozen(numbers("vertices", self.vertices, np.float32))
@@ -56,11 +69,30 @@ class Mesh:
             raise InputError(f"vertices: hold a number that is not finite or beyond {LARGEST:g}")
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", faces)
-        if self.normals is not None:
-            normals = frozen(numbers("normals", self.normals, np.float32))
-            if normals.shape != (len(faces), 3, 3) or not np.isfinite(normals).all():
-                raise InputError(f"normals: need shape ({len(faces)}, 3, 3) and finite numbers")
-            object.__setattr__(self, "normals", normals)
+        self._set_at_corners("normals", 3)
+        self._set_at_corners("colors", 4, low=0.0, high=1.0)
+        self._set_at_corners("tangents", 4)
+        if not is_list(self.uvs) or len(self.uvs) > UV_SETS:
+            raise InputError(f"uvs: are not a list of at most {UV_SETS} arrays, (F, 3, 2) each")
+        sets = tuple(self._at_corners("uvs", values, 2, -LARGEST, LARGEST) for values in self.uvs)
+        object.__setattr__(self, "uvs", sets)
+
+    def _set_at_corners(self, name: str, count: int, low: float = -np.inf, high: float = np.inf) -> None:
+        values = getattr(self, name)
+        if values is not None:
+            object.__setattr__(self, name, self._at_corners(name, values, count, low, high))
+
+    def _at_corners(
+        self, name: str, values: npt.ArrayLike, count: int, low: float, high: float
+    ) -> npt.NDArray[np.float32]:
+        """So many numbers for each corner of each face. Raises InputError."""
+        array: npt.NDArray[np.float32] = frozen(numbers(name, values, np.float32))
+        shape = (len(self.faces), 3, count)
+        if array.shape != shape or not np.isfinite(array).all():
+            raise InputError(f"{name}: need shape {shape} and finite numbers")
+        if array.min() < low or array.max() > high:
+            raise InputError(f"{name}: hold a number out of range; use {low:g} to {high:g}")
+        return array
 
     @cached_property
     def bounds(self) -> npt.NDArray[np.float32]:

@@ -1,4 +1,4 @@
-"""The built-in shapes: vertices, faces and corner normals (object space, metres)."""
+"""The built-in shapes: vertices, faces, corner normals (object space, metres) and texture coordinates."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from incpt.core.checks import described
 from incpt.core.errors import InputError
 from incpt.scene.mesh import Mesh, MeshSource
 
-Shape = tuple[npt.NDArray[np.float64], npt.NDArray[np.int64], npt.NDArray[np.float64] | None]
+Array = npt.NDArray[np.float64]
+Shape = tuple[Array, npt.NDArray[np.int64], Array | None, Array]
+"""Vertices, faces, corner normals if any, and texture coordinates (F, 3, 2)."""
 SPHERE_SUBDIVISIONS = 5
 """20 * 4^5 = 20,480 triangles: the outline shows no corners at 1080 rows."""
 CYLINDER_SEGMENTS = 128
@@ -20,7 +22,8 @@ CYLINDER_SEGMENTS = 128
 def plane() -> Shape:
     """1 x 1 in the xz plane, facing +y."""
     vertices = np.array([[-0.5, 0, -0.5], [-0.5, 0, 0.5], [0.5, 0, 0.5], [0.5, 0, -0.5]])
-    return vertices, np.array([[0, 1, 2], [0, 2, 3]]), None
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    return vertices, faces, None, vertices[faces][..., [0, 2]] + 0.5
 
 
 def cube() -> Shape:
@@ -28,7 +31,18 @@ def cube() -> Shape:
     vertices = np.array([[(i & 1) - 0.5, (i >> 1 & 1) - 0.5, (i >> 2 & 1) - 0.5] for i in range(8)])
     quads = [(0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)]
     faces = np.array([face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))])
-    return vertices, faces, None
+    return vertices, faces, None, _on_sides(vertices[faces])
+
+
+def _on_sides(corners: Array) -> Array:
+    """The whole image on each side of the unit cube, upright as seen from outside; on top and bottom with the
+    image's upper edge to -z and to +z."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    up = np.where(np.abs(normal[:, 1:2]) > 0.5, [[0.0, 0.0, -1.0]] * normal[:, 1:2], [[0.0, 1.0, 0.0]])
+    right = np.cross(up, normal)
+    return np.stack(
+        [np.einsum("fcd,fd->fc", corners, right) + 0.5, 0.5 - np.einsum("fcd,fd->fc", corners, up)], axis=2
+    )
 
 
 def sphere() -> Shape:
@@ -51,7 +65,20 @@ def sphere() -> Shape:
     for _ in range(SPHERE_SUBDIVISIONS):
         vertices, faces = _subdivide(vertices, faces)
     normals = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
-    return normals * 0.5, faces, normals[faces]
+    return normals * 0.5, faces, normals[faces], _around(normals[faces])
+
+
+def _around(directions: Array) -> Array:
+    """Texture coordinates of unit vectors (F, 3, 3) at the corners of faces: as a map of the earth, whose
+    middle looks to +z. Faces across the seam go beyond the edge of the image; corners at a pole have the
+    longitude of the middle of their face."""
+    u = 0.5 + np.arctan2(directions[..., 0], directions[..., 2]) / (2 * np.pi)
+    pole = np.hypot(directions[..., 0], directions[..., 2]) < 1e-9
+    least = np.where(pole, np.inf, u).min(axis=1, keepdims=True)
+    u = np.where(u - least > 0.5, u - 1, u)
+    others = np.where(pole, 0, u).sum(axis=1, keepdims=True) / (~pole).sum(axis=1, keepdims=True)
+    v = np.arccos(np.clip(directions[..., 1], -1, 1)) / np.pi
+    return np.stack([np.where(pole, others, u), v], axis=2)
 
 
 def _subdivide(
@@ -80,7 +107,22 @@ def cylinder() -> Shape:
     faces = np.concatenate([np.stack(group, axis=1) for group in groups])
     up = np.broadcast_to([0.0, 1.0, 0.0], (n, 3, 3))
     normals = np.concatenate([ring[np.stack([i, i, j], 1)], ring[np.stack([i, j, j], 1)], -up, up])
-    return vertices, faces, normals
+    around = np.arange(n + 1) / n
+    left, right = 1 - around[:-1], 1 - around[1:]  # the angle grows clockwise as seen from outside
+    one, zero = np.ones(n), np.zeros(n)
+    wall = [
+        np.stack(
+            [np.column_stack([left, one]), np.column_stack([left, zero]), np.column_stack([right, zero])], 1
+        ),
+        np.stack(
+            [np.column_stack([left, one]), np.column_stack([right, zero]), np.column_stack([right, one])], 1
+        ),
+    ]
+    caps = [
+        vertices[faces[2 * n : 3 * n]][..., [0, 2]] * [1, -1] + 0.5,
+        vertices[faces[3 * n :]][..., [0, 2]] + 0.5,
+    ]
+    return vertices, faces, normals, np.concatenate([*wall, *caps])
 
 
 _GENERATORS = {"cube": cube, "sphere": sphere, "plane": plane, "cylinder": cylinder}
@@ -90,8 +132,8 @@ SHAPES = tuple(_GENERATORS)
 
 def shape(name: str) -> Mesh:
     """A built-in mesh: cube ([-0.5, 0.5]^3), sphere (radius 0.5), plane (1 x 1, facing +y), cylinder
-    (radius 0.5, height 1, along y). Sphere and cylinder carry shading normals. It is the same mesh at every
-    call. Raises InputError."""
+    (radius 0.5, height 1, along y). Sphere and cylinder carry shading normals, all carry texture coordinates.
+    It is the same mesh at every call. Raises InputError."""
     if not isinstance(name, str) or name not in SHAPES:
         raise InputError(f"shape {described(name)} is not known; choose one of {', '.join(SHAPES)}")
     return _made(name)
@@ -99,6 +141,9 @@ def shape(name: str) -> Mesh:
 
 @cache
 def _made(name: str) -> Mesh:
-    vertices, faces, normals = _GENERATORS[name]()
+    vertices, faces, normals, uvs = _GENERATORS[name]()
     corner_normals = None if normals is None else normals.astype(np.float32)
-    return Mesh(vertices.astype(np.float32), faces.astype(np.int32), corner_normals, MeshSource(shape=name))
+    source = MeshSource(shape=name)
+    return Mesh(
+        vertices.astype(np.float32), faces.astype(np.int32), corner_normals, source, (uvs.astype(np.float32),)
+    )
