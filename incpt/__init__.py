@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     )
     from incpt.core.settings import RenderSettings as RenderSettings
     from incpt.device.device import Device as Device
+    from incpt.formats.bitmaps import load_bitmap as load_bitmap
     from incpt.formats.images import load_image as load_image, write_exr as write_exr, write_png as write_png
     from incpt.formats.mesh_files import load_mesh as load_mesh
     from incpt.formats.registry import load as load
@@ -40,9 +41,12 @@ if TYPE_CHECKING:
     from incpt.scene.mesh import Mesh as Mesh, MeshSource as MeshSource
     from incpt.scene.model import Object as Object, Scene as Scene
     from incpt.scene.shapes import shape as shape
+    from incpt.scene.texture import Bitmap as Bitmap, BitmapSource as BitmapSource, Texture as Texture
     from incpt.scene.transform import Transform as Transform
 
 _HOMES = {
+    "Bitmap": "scene.texture",
+    "BitmapSource": "scene.texture",
     "Camera": "scene.camera",
     "Change": "scene.change",
     "Device": "device.device",
@@ -63,9 +67,11 @@ _HOMES = {
     "Session": "render.session",
     "Snapshot": "render.session",
     "StepReport": "render.session",
+    "Texture": "scene.texture",
     "Transform": "scene.transform",
     "diff": "scene.change",
     "load": "formats.registry",
+    "load_bitmap": "formats.bitmaps",
     "load_image": "formats.images",
     "load_mesh": "formats.mesh_files",
     "save": "formats.scene_save",

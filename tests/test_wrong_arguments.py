@@ -50,6 +50,9 @@ SCENE = mixed_scene(size=(16, 8))
 RIGHT: Mapping[str, Mapping[str, Any]] = {
     "Mesh": {"vertices": np.eye(3), "faces": [[0, 1, 2]]},
     "Image": {"pixels": np.ones((2, 4, 3))},
+    "Bitmap": {"pixels": np.ones((2, 4, 3))},
+    "Texture": {"bitmap": incpt.Bitmap(np.ones((2, 4, 3)))},
+    "load_bitmap": {"path": "a.png"},
     "Object": {"name": "a", "mesh": incpt.shape("cube"), "material": "red"},
     "Camera.image_plane": {"aspect": 2.0},
     "Camera.project": {"points": np.eye(3), "aspect": 2.0},
@@ -150,7 +153,7 @@ def test_a_wrong_argument_is_told_in_one_line(
             text = str(error)
             assert "\n" not in text and len(text) <= LONGEST_MESSAGE, kind
             # A path or a part that might be one is not the wrong argument, but leads to no file.
-            if argument not in ("path", "part") or kind not in ("a text", "None"):
+            if argument not in ("path", "part", "index") or kind not in ("a text", "None", "a number"):
                 assert text.startswith(WORDS.get(argument, (argument,))), f"{name}({argument}={kind}): {text}"
             refused += isinstance(error, InputError)
         except Exception as error:

@@ -21,6 +21,7 @@ from incpt.ui.panels import environment as environment_panel
 from incpt.ui.panels import material as material_panel
 from incpt.ui.panels import name as name_panel
 from incpt.ui.panels import notices, outliner, plots, render, tool, transform
+from incpt.ui.panels import textures as textures_panel
 from incpt.ui.rect import Rect
 from incpt.ui.widgets import places, widgets
 from incpt.ui.widgets.refusals import Refusals
@@ -109,10 +110,13 @@ class Workspace:
             users = sum(o.material == material for o in scene.objects)
             outcome = material_panel.draw_choice(tuple(scene.materials), material, users)
             new = material_panel.draw(scene.materials[material], refusals)
+            new, wanted = textures_panel.draw(new, refusals)
         if new is not scene.materials[material]:
             materials = {**scene.materials, material: new}
             editor.propose(replace(scene, materials=materials), f"Material {material}", _key())
         editor.attempt(lambda: _apply_material_outcome(editor, material, outcome))
+        if wanted.choose is not None:
+            files.choose_texture(editor, material, wanted.choose)
 
     def _draw_scene(self, editor: Editor) -> None:
         refusals = Refusals()

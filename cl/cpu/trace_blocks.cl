@@ -13,6 +13,7 @@
 #if defined(BRUTE_FORCE) && defined(TOP_LEVEL_ONLY)
 #define BRUTE_FORCE_ONLY
 #endif
+#include "path/map_normal.cl"
 #include "path/setup_surface.cl"
 #include "path/shade_miss.cl"
 #include "cpu/interleaved.cl"
@@ -207,6 +208,14 @@ STAGE void setup_surfaces(const Block *block, BlockRay *ray) {
         const Surface surface = surface_at(&block->geometry, &hit);
         store_surface(&block->state, i, &surface);
     }
+#if TEXTURED(NORMAL)
+    LANES
+    for (int i = 0; i < (int)count; i++) {
+        Surface surface = load_surface(&block->state, i);
+        map_normal(block->geometry.objects, &block->shading, &surface);
+        store3(block->state.surfaces + SURFACE_SHADING_X * BLOCK_STRIDE, BLOCK_STRIDE, i, surface.shading);
+    }
+#endif
 }
 
 #ifdef AOVS
@@ -248,7 +257,7 @@ STAGE void shade_media(const Block *block, const BlockRay *ray) {
 #if defined(LIGHT_SAMPLING) && !defined(SMOOTH_MEDIA)
     LANES
     for (int i = first; i < (int)count; i++)
-        sample_lights_path(block->params, &block->emitters, state, i);
+        sample_lights_path(block->params, &block->shading, &block->emitters, state, i);
 #endif
     LANES
     for (int i = first; i < (int)count; i++)
@@ -266,7 +275,7 @@ STAGE void shade_media(const Block *block, const BlockRay *ray) {
 #ifdef SMOOTH_MEDIA
     LANES
     for (int i = 0; i < (int)opaque; i++)
-        sample_lights_path(block->params, &block->emitters, state, list[i]);
+        sample_lights_path(block->params, &block->shading, &block->emitters, state, list[i]);
 #endif
     LANES
     for (int i = 0; i < (int)opaque; i++)
@@ -284,7 +293,7 @@ STAGE void shade_surfaces(const Block *block, const BlockRay *ray) {
 #ifdef LIGHT_SAMPLING
     LANES
     for (int i = 0; i < (int)count; i++)
-        sample_lights_path(block->params, &block->emitters, &block->state, i);
+        sample_lights_path(block->params, &block->shading, &block->emitters, &block->state, i);
 #endif
     LANES
     for (int i = 0; i < (int)count; i++)

@@ -1,3 +1,4 @@
+#include "path/map_normal.cl"
 #include "path/setup_surface.cl"
 #include "path/trace.cl"
 
@@ -17,7 +18,11 @@ __kernel __attribute__((vec_type_hint(float8))) void intersect(LAUNCH_PARAMETERS
         store_class(&state, path, CLASS_MISS);
         return;
     }
-    const Surface surface = surface_at(&geometry, &hit);
+    Surface surface = surface_at(&geometry, &hit);
+#if TEXTURED(NORMAL)
+    const Shading shading = {SHADING_ARGUMENTS};
+    map_normal(objects, &shading, &surface);
+#endif
     store_surface(&state, path, &surface);
     store_class(&state, path, hit_class(&geometry, materials, hit.object, is_in_medium(&state, path)));
 }

@@ -154,6 +154,8 @@ INLINE Surface surface_at(const Geometry *geometry, const RawHit *hit) {
     surface.distance = hit->distance;
     surface.object = hit->object;
     surface.material = object->material;
+    surface.weight_b = weight.y;
+    surface.weight_c = weight.z;
     return surface;
 }
 

@@ -1,6 +1,4 @@
-#include "path/state.cl"
-#include "scene/light.cl"
-#include "shading/material.cl"
+#include "path/surface_emission.cl"
 
 // What happens where a ray ends on an opaque surface: the path gathers what is emitted there, asks for a
 // shadow ray towards a light, and goes on in a direction that the material chooses.
@@ -17,8 +15,8 @@ INLINE void finish_path(const Shading *shading, const State *state, uint path, u
     Surface surface = load_surface(state, path);
     Path p = load_path(state, path);
     float facing = -dot(surface.geometric, direction);
-    Vec3 emitted =
-        emitted_radiance(&shading->materials[surface.material], facing, surface.distance, p.bsdf_pdf);
+    SurfaceMaterial material = surface_material(shading, &surface);
+    Vec3 emitted = surface_emission(shading, &surface, &material, facing, p.bsdf_pdf);
     accumulate(state, result, mul(p.throughput, emitted));
     store_class(state, path, 0u);
 }
@@ -44,21 +42,21 @@ INLINE void shade_path(const Params *params, const Shading *shading, const State
     Vec3 direction = load_ray(state->rays, STRIDE(state), path).direction;
     Surface surface = load_surface(state, path);
     Path p = load_path(state, path);
-    __global const Material *material = &shading->materials[surface.material];
+    SurfaceMaterial material = surface_material(shading, &surface);
 
 #ifdef MATTE
     int mirrors = 0;
 #else
-    int mirrors = (material->metallic > 0.0f) | (material->specular > 0.0f);
+    int mirrors = (material.metallic > 0.0f) | (material.specular > 0.0f);
 #endif
     float facing = orient_surface(&surface, direction, mirrors);
-    Vec3 emitted = emitted_radiance(material, facing, surface.distance, p.bsdf_pdf);
+    Vec3 emitted = surface_emission(shading, &surface, &material, facing, p.bsdf_pdf);
     accumulate(state, result, mul(p.throughput, emitted));
 
     Vec3 wo;
     Frame frame = shading_frame(&surface, direction, &wo);
-    OpaqueBsdf bsdf =
-        bsdf_of(material, shading->layers + surface.material * LAYER_SIZE, params->multiple_scattering);
+    OpaqueBsdf bsdf = bsdf_of(&material, shading->layers + surface.material * LAYER_SIZE, shading->albedos,
+                              params->multiple_scattering);
     Ray next_ray;
     next_ray.origin = along(surface.position, surface.offset, surface.geometric);
     int scatters = p.bounces <= params->max_bounces;

@@ -1,5 +1,4 @@
-#include "path/state.cl"
-#include "scene/light.cl"
+#include "path/surface_emission.cl"
 #include "shading/dielectric.cl"
 
 // What happens where a ray ends on a transparent body, or inside one: absorption on the way, then the
@@ -37,7 +36,7 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
     Vec3 direction = load_ray(state->rays, STRIDE(state), path).direction;
     Surface surface = load_surface(state, path);
     Path p = load_path(state, path);
-    __global const Material *material = &materials[surface.material];
+    SurfaceMaterial material = surface_material(shading, &surface);
     uint seed = pixel_seed(p.pixel, params->seed);
 
     // Absorption on the way here.
@@ -46,9 +45,9 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
 
     // A material that is partly transmissive is taken for opaque by chance.
     Uniform2 luck = uniform_2d(seed, p.sample, PAIR_LUCK(p.ray));
-    int opaque = luck.v >= material->transmission;
+    int opaque = luck.v >= material.transmission;
     float facing = orient_surface(&surface, direction, 1);
-    Vec3 emitted = emitted_radiance(material, facing, surface.distance, p.bsdf_pdf);
+    Vec3 emitted = surface_emission(shading, &surface, &material, facing, p.bsdf_pdf);
     accumulate(state, result, select(opaque, vec3(0.0f, 0.0f, 0.0f), mul(throughput, emitted)));
 
     // The media on both sides. A ray that leaves a body which it never entered has started inside of it.
@@ -65,9 +64,9 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
     Frame frame = shading_frame(&surface, direction, &wo);
     Boundary boundary;
     boundary.eta = medium_ior(materials, media.far) / medium_ior(materials, media.near);
-    boundary.alpha = MAX(material->roughness * material->roughness, MIN_ALPHA);
-    boundary.specular = material->specular;
-    boundary.transmitted = vec3_at(material->base_color);
+    boundary.alpha = MAX(material.roughness * material.roughness, MIN_ALPHA);
+    boundary.specular = material.specular;
+    boundary.transmitted = material.base_color;
     Uniform2 choices = uniform_2d(seed, p.sample, PAIR_CHOICE(p.ray));
     uint path_class = 0u;
 
@@ -75,7 +74,7 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
     int smooth = 1;
 #ifndef SMOOTH_MEDIA
     // Without a step in IOR there is nothing to scatter at, however rough the boundary is.
-    smooth = (material->roughness * material->roughness <= MIN_ALPHA) | (FABS(boundary.eta - 1.0f) < 1e-5f);
+    smooth = (material.roughness * material.roughness <= MIN_ALPHA) | (FABS(boundary.eta - 1.0f) < 1e-5f);
 #ifdef LIGHT_SAMPLING
     // Light sampling, where the boundary has a density for it.
     int scatters = (!covered) & (!smooth) & (!opaque) & (p.bounces <= params->max_bounces);

@@ -1,5 +1,6 @@
 #include "base/sampling.cl"
 #include "scene/light_sample.cl"
+#include "base/attributes.cl"
 #include "shading/medium.cl"
 
 // The state of paths, as planes: plane p of path i is planes[p * stride + i].
@@ -138,6 +139,7 @@ typedef struct {
     float distance;          // along the ray
     Vec3 position;
     uint object, material, face;
+    float weight_b, weight_c; // of the second and third corner; scenes without textures don't keep them
 } Surface;
 
 INLINE Surface load_surface(const State *state, uint path) {
@@ -151,6 +153,10 @@ INLINE Surface load_surface(const State *state, uint path) {
     s.object = load_bits(state->surfaces, SURFACE_OBJECT * stride + path);
     s.material = load_bits(state->surfaces, SURFACE_MATERIAL * stride + path);
     s.face = load_bits(state->surfaces, SURFACE_FACE * stride + path);
+#ifdef CORNER_ATTRIBUTES
+    s.weight_b = state->surfaces[SURFACE_WEIGHT_B * stride + path];
+    s.weight_c = state->surfaces[SURFACE_WEIGHT_C * stride + path];
+#endif
     return s;
 }
 
@@ -164,6 +170,10 @@ INLINE void store_surface(const State *state, uint path, const Surface *s) {
     store_bits(state->surfaces, SURFACE_OBJECT * stride + path, s->object);
     store_bits(state->surfaces, SURFACE_MATERIAL * stride + path, s->material);
     store_bits(state->surfaces, SURFACE_FACE * stride + path, s->face);
+#ifdef CORNER_ATTRIBUTES
+    state->surfaces[SURFACE_WEIGHT_B * stride + path] = s->weight_b;
+    state->surfaces[SURFACE_WEIGHT_C * stride + path] = s->weight_c;
+#endif
 }
 
 #ifndef FLAT

@@ -11,6 +11,9 @@ INLINE uint asks_for_changed_light(const Params *params, const Shading *shading,
     float choice = uniform_2d(seed, p.sample, PAIR_CHOICE(p.ray)).v;
     // As in shade_medium: only smooth boundaries need no light.
     int opaque = uniform_2d(seed, p.sample, PAIR_LUCK(p.ray)).v >= material->transmission;
+#if TEXTURED(TRANSMISSION)
+    opaque = 1; // or may be
+#endif
     int rough = material->roughness * material->roughness > MIN_ALPHA;
     int asks = (p.bounces <= params->max_bounces) & (opaque | rough);
     return chooses_changed_light(params, emitters, choice) & (uint)asks;

@@ -1,4 +1,4 @@
-#include "path/state.cl"
+#include "path/surface_material.cl"
 
 // Auxiliary images from the samples of the picture: base colour and shading normal of the first surface.
 
@@ -8,8 +8,11 @@ INLINE void write_aovs_path(const Shading *shading, const State *state, uint pat
     Surface surface = load_surface(state, path);
     int missed = surface.object == NO_INDEX;
     Vec3 nothing = vec3(0.0f, 0.0f, 0.0f);
-    Vec3 albedo = vec3_at(shading->materials[surface.material & INDEX_MASK(surface.object)].base_color);
-    albedo = select(missed, nothing, albedo);
+    // What a ray that missed has left there is no index.
+    surface.material &= INDEX_MASK(surface.object);
+    surface.face &= INDEX_MASK(surface.object);
+    surface.object = INDEX_OR_0(surface.object);
+    Vec3 albedo = select(missed, nothing, surface_material(shading, &surface).base_color);
     Vec3 normal = select(missed, nothing, surface.shading);
     path_buffer[SAMPLE_ALBEDO_R * stride + place] = albedo.x;
     path_buffer[SAMPLE_ALBEDO_G * stride + place] = albedo.y;

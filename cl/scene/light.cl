@@ -1,5 +1,6 @@
 #include "base/sampling.cl"
 #include "scene/light_sample.cl"
+#include "base/texture.cl"
 
 // Emitters: triangles, and the environment. Which exist is known when a kernel is built
 // (ENVIRONMENT_IMAGE, TRIANGLE_LIGHTS), so that a scene does not pay for emitters that it does not have.
@@ -120,12 +121,27 @@ INLINE Vec3 start_towards(Vec3 point, Vec3 position, Vec3 step) {
     return along(position, side, step);
 }
 
+#if TEXTURED(EMISSION)
+// Where a point of a triangle lies in the texture of its emission, for both sets.
+INLINE Uvs light_uvs(__global const float *lights, uint stride, uint light, float b1, float b2) {
+    Uvs uvs;
+    uvs.u0 = lights[LIGHT_U * stride + light] + b1 * lights[LIGHT_EDGE_1_U * stride + light] +
+             b2 * lights[LIGHT_EDGE_2_U * stride + light];
+    uvs.v0 = lights[LIGHT_V * stride + light] + b1 * lights[LIGHT_EDGE_1_V * stride + light] +
+             b2 * lights[LIGHT_EDGE_2_V * stride + light];
+    uvs.u1 = uvs.u0;
+    uvs.v1 = uvs.v0;
+    return uvs;
+}
+#endif
+
 // `choice` selects the triangle, `uv` the point on it. Direction, distance and density are those from where
 // the shadow ray starts. It ends before the point by what rounding may put between that and the light's
 // surface, which would be in its way. That is the more the flatter the light is seen, but never so much that
 // the ray passes by what stands before the light.
-INLINE LightSample sample_triangle_light(const Params *params, const Emitters *emitters, Vec3 position,
-                                         Vec3 step, Uniform2 uv, float choice) {
+INLINE LightSample sample_triangle_light(const Params *params, const Shading *shading,
+                                         const Emitters *emitters, Vec3 position, Vec3 step, Uniform2 uv,
+                                         float choice) {
     uint stride = params->light_count;
     __global const float *lights = emitters->lights;
     uint light = chosen_triangle(params, emitters, choice);
@@ -150,6 +166,11 @@ INLINE LightSample sample_triangle_light(const Params *params, const Emitters *e
     float slack = lights[LIGHT_SLACK * stride + light] + 0x1p-21f * distance;
     result.distance = distance - MIN(slack * inverse_facing, 0.125f * distance);
     result.radiance = light_vec3(lights + LIGHT_EMISSION_R * stride, stride, light);
+#if TEXTURED(EMISSION)
+    uint texture = ((__global const uint *)lights)[LIGHT_TEXTURE * stride + light];
+    Uvs uvs = light_uvs(lights, stride, light, b1, b2);
+    result.radiance = mul(result.radiance, sample_texture(shading, texture, &uvs).color);
+#endif
     result.pdf = valid ? lights[LIGHT_PDF_AREA * stride + light] * squared * inverse_facing : 0.0f;
     return result;
 }
@@ -166,14 +187,14 @@ INLINE float second_choice(const Params *params, float choice) {
 #ifdef LIGHT_SAMPLING
 // One direction towards a light, chosen by power among triangles and the environment.
 // `step` is how far off the surface at `position` rays start, along its normal.
-INLINE LightSample sample_light(const Params *params, const Emitters *emitters, Vec3 position, Vec3 step,
-                                Uniform2 uv, float choice) {
+INLINE LightSample sample_light(const Params *params, const Shading *shading, const Emitters *emitters,
+                                Vec3 position, Vec3 step, Uniform2 uv, float choice) {
 #if defined(ENVIRONMENT_IMAGE) && defined(TRIANGLE_LIGHTS)
     float p = params->environment_probability;
     int far = choice < p;
     LightSample a = sample_environment(params, emitters, uv);
     LightSample b =
-        sample_triangle_light(params, emitters, position, step, uv, second_choice(params, choice));
+        sample_triangle_light(params, shading, emitters, position, step, uv, second_choice(params, choice));
     LightSample result;
     result.direction = select(far, a.direction, b.direction);
     result.distance = far ? a.distance : b.distance;
@@ -183,7 +204,7 @@ INLINE LightSample sample_light(const Params *params, const Emitters *emitters, 
 #elif defined(ENVIRONMENT_IMAGE)
     return sample_environment(params, emitters, uv);
 #elif defined(TRIANGLE_LIGHTS)
-    return sample_triangle_light(params, emitters, position, step, uv, choice);
+    return sample_triangle_light(params, shading, emitters, position, step, uv, choice);
 #endif
 }
 #endif
@@ -201,14 +222,14 @@ INLINE uint chooses_changed_light(const Params *params, const Emitters *emitters
 #endif
 }
 
-// Radiance that a surface emits towards the origin of the ray that has met it, weighted against light
-// sampling, which would have found the point with the material's area density. `facing` is the cosine between
-// the geometric normal and the way back along the ray. A `bsdf_pdf` of 0 says that light sampling could not
-// have found the point.
-INLINE Vec3 emitted_radiance(__global const Material *material, float facing, float distance,
-                             float bsdf_pdf) {
+// What arrives of the radiance `emission` of a surface at the origin of the ray that has met it, weighted
+// against light sampling, which would have found the point with the area density `density`. `facing` is the
+// cosine between the geometric normal and the way back along the ray. A `bsdf_pdf` of 0 says that light
+// sampling could not have found the point.
+INLINE Vec3 emitted_radiance(__global const Material *material, Vec3 emission, float density, float facing,
+                             float distance, float bsdf_pdf) {
     int shines = ((material->flags & MATERIAL_DOUBLE_SIDED) != 0u) | (facing > 0.0f);
-    float light_pdf = material->light_pdf * distance * distance / MAX(FABS(facing), 1e-7f);
+    float light_pdf = density * distance * distance / MAX(FABS(facing), 1e-7f);
     float weight = bsdf_sampling_weight(bsdf_pdf, light_pdf);
-    return scale(shines ? weight : 0.0f, vec3_at(material->emission));
+    return scale(shines ? weight : 0.0f, emission);
 }

@@ -113,6 +113,18 @@ SHADING = Group(
     (
         _table("materials", "Material", "every material"),
         _table("layers", "float", "of every material the albedo table of its layer, see shading/material.cl"),
+        _table("albedos", "float", "the albedo table of all roughnesses, see albedo.rows"),
+        _table("textures", "Texture", "every texture of a material; the first is white"),
+        _table("texels", "uint", "the pixels of all bitmaps, see base/texture.cl"),
+        _table("byte_values", "float", "what a byte of a pixel stands for, and what one in sRGB does"),
+        _table("attributes", "Attributes", "of every object, where its mesh has what follows"),
+        _table("uvs", "float", "texture coordinates at the corners of faces, mesh by mesh"),
+        _table("colors", "float", "colours at the corners of faces, mesh by mesh"),
+        _table("tangents", "float", "tangents and their sides at the corners of faces, mesh by mesh"),
+        _table(
+            "first_share", "uint", "of every object, where the shares of its faces begin; 0: there are none"
+        ),
+        _table("emitter_shares", "float", "of faces in the density of their material; 1 in front"),
     ),
 )
 
@@ -479,7 +491,7 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     "generate": (LAUNCH, SLOTS, PLACES, PATH_STATE),
     "compact": (LAUNCH, LIST, PATH_STATE, COMPACTION),
     "intersect": (LAUNCH, LIST, GEOMETRY, SHADING, PATH_STATE),
-    "sample_lights": (LAUNCH, LIST, EMITTERS, PATH_STATE),
+    "sample_lights": (LAUNCH, LIST, SHADING, EMITTERS, PATH_STATE),
     "shade": (LAUNCH, LIST, SHADING, PATH_STATE),
     "shade_medium": (LAUNCH, LIST, SHADING, PATH_STATE, COUNTERS),
     "shade_miss": (LAUNCH, LIST, SHADING, EMITTERS, PATH_STATE),

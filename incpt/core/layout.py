@@ -67,6 +67,10 @@ ALBEDO_TABLE_SIZE = 32
 """Resolution of the specular albedo table in cosine and in roughness (see `albedo.py`)."""
 LAYER_SIZE = ALBEDO_TABLE_SIZE + 4
 """Floats of a material in the table of layers (see `albedo.layer_row`)."""
+ALBEDO_ROW_SIZE = 2 * ALBEDO_TABLE_SIZE + 2
+"""Floats of a roughness in the table of albedos (see `albedo.rows`)."""
+LEAST_ALBEDO_LOSS = 1e-3
+"""Of light, below which nothing is made of what scatters again: the table of albedos knows no better."""
 ENVIRONMENT_MAX_SIZE = 4096
 """Largest width or height of an environment image; the kernels' binary search takes log2 of it steps."""
 ENVIRONMENT_SEARCH_STEPS = 12
@@ -105,7 +109,9 @@ class SurfacePlane(IntEnum):
     The geometric normal follows the winding of the face; the shading normal lies on its side.
     OFFSET bounds the rounding error of POSITION along the geometric normal: a ray that leaves the surface
     starts that far along it. It is 0 where there is no such error. FACE counts in the mesh. After `intersect`
-    OBJECT is NO_INDEX (as uint) where the ray left the scene.
+    OBJECT is NO_INDEX (as uint) where the ray left the scene. WEIGHT_B and WEIGHT_C are the barycentric
+    weights of the second and third corner, for what meshes have at corners; only scenes with textures have
+    them.
     """
 
     GEOMETRIC_X = 0
@@ -122,6 +128,8 @@ class SurfacePlane(IntEnum):
     OBJECT = 11
     MATERIAL = 12
     FACE = 13
+    WEIGHT_B = 14
+    WEIGHT_C = 15
 
 
 class PathPlane(IntEnum):
@@ -176,7 +184,9 @@ class LightPlane(IntEnum):
 
     PDF_AREA is the density of choosing the triangle and a point on it, per square metre; ALIAS (uint) and
     ALIAS_PROBABILITY are the Walker/Vose table over the triangles; FLAGS are of LightFlag (uint). SLACK
-    bounds how far rounding takes a chosen point off the triangle as rays meet it, in metres.
+    bounds how far rounding takes a chosen point off the triangle as rays meet it, in metres. The planes from
+    TEXTURE on are there where emission has textures: the texture (uint) that the emission is multiplied with,
+    and the place in it of the vertex and of the ends of the edges, as VERTEX and EDGE of the triangle.
     """
 
     VERTEX_X = 0
@@ -196,6 +206,13 @@ class LightPlane(IntEnum):
     ALIAS = 14
     FLAGS = 15
     SLACK = 16
+    TEXTURE = 17
+    U = 18
+    V = 19
+    EDGE_1_U = 20
+    EDGE_1_V = 21
+    EDGE_2_U = 22
+    EDGE_2_V = 23
 
 
 class LightFlag(IntFlag):
@@ -423,6 +440,34 @@ class MaterialFlag(IntFlag):
     TRANSMISSIVE = 2
 
 
+class TextureSlot(IntEnum):
+    """What a material may read from textures, in the order of MATERIAL.textures; the feature TEXTURES has a
+    bit for each that some material of the scene has."""
+
+    BASE_COLOR = 0
+    METALLIC_ROUGHNESS = 1
+    NORMAL = 2
+    EMISSION = 3
+    TRANSMISSION = 4
+    SPECULAR = 5
+
+
+class TextureFlag(IntFlag):
+    """How the pixels of a texture are stored and read. HALF: as half floats, and not as bytes. SRGB: bytes of
+    colours are encoded. GREY: the first channel stands for red, green and blue. ALPHA: the last channel is
+    alpha. NEAREST: no interpolation. CLAMP_U, MIRROR_U and those of v: not repeated."""
+
+    HALF = 1
+    SRGB = 2
+    GREY = 4
+    ALPHA = 8
+    NEAREST = 16
+    CLAMP_U = 32
+    MIRROR_U = 64
+    CLAMP_V = 128
+    MIRROR_V = 256
+
+
 class Bits(NamedTuple):
     """Some bits of a word: the lowest of them, and how many they are."""
 
@@ -566,6 +611,33 @@ MATERIAL = _packed(
         ("light_pdf", np.float32),  # area density with which light sampling finds a point of this emitter
         ("priority", np.uint32),
         ("flags", np.uint32),
+        ("normal_scale", np.float32),  # of the deflections of its normal map
+        ("textures", np.uint32, (len(TextureSlot),)),  # rows of TEXTURE; 0 is white
+    ]
+)
+
+TEXTURE = _packed(
+    [
+        ("first_word", np.uint32),  # of its pixels in the buffer of all texels
+        ("width", np.uint32),
+        ("height", np.uint32),
+        ("channels", np.uint32),  # of each pixel, 1 to 4
+        ("flags", np.uint32),  # TextureFlag
+        ("uv_set", np.uint32),
+        ("matrix", np.float32, (6,)),  # 2 x 3, row by row: the place in the image of texture coordinates
+    ]
+)
+
+ATTRIBUTES = _packed(
+    [
+        # What the mesh of an object has at its corners: the first float of each, and 1 where it is there. For
+        # what is not there, what kernels read in its place stands at `first`.
+        ("first_uv", np.uint32, (2,)),
+        ("has_uv", np.uint32, (2,)),
+        ("first_color", np.uint32),
+        ("has_color", np.uint32),
+        ("first_tangent", np.uint32),
+        ("has_tangent", np.uint32),
     ]
 )
 
@@ -644,6 +716,8 @@ STRUCTS: dict[str, np.dtype[np.void]] = {
     "Cluster": CLUSTER,
     "Object": OBJECT,
     "Material": MATERIAL,
+    "Texture": TEXTURE,
+    "Attributes": ATTRIBUTES,
     "Slot": SLOT,
     "Camera": CAMERA,
     "Params": PARAMS,
@@ -712,6 +786,8 @@ def c_header() -> str:
         (Counter, "COUNTER"),
         (SlotFlag, "SLOT"),
         (MaterialFlag, "MATERIAL"),
+        (TextureSlot, "SLOT_OF"),
+        (TextureFlag, "TEXTURE"),
     ):
         lines += _c_enum(enum, prefix)
         if issubclass(enum, IntEnum):

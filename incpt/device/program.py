@@ -40,6 +40,8 @@ FEATURES = {
     "FLAT": "No mesh has normals of its own.",
     "TOP_LEVEL_ONLY": "Every triangle lies in the packs of the top level, in world space.",
     "BRUTE_FORCE": "The triangles of the top level are so few that blocks test them without a tree.",
+    "TEXTURES": "With a number: a bit for each TextureSlot that some material has.",
+    "VERTEX_COLORS": "Some mesh has colours at its corners.",
     "AOVS": "Paths write base colour and normal of the first surface into the path buffer.",
     "CHANGES": "Blocks tell of each path whether it met something that changed between two scenes.",
     "EMISSION_ONLY": "No path goes on after this ray, so that surfaces only emit.",

@@ -25,7 +25,7 @@ from typing import Any
 
 from incpt.core.errors import InputError, in_place
 from incpt.core.files import check_readable
-from incpt.formats import images
+from incpt.formats import images, textures
 from incpt.formats.mesh_library import MeshLibrary
 from incpt.formats.scene_toml import (
     CAMERA_KEYS,
@@ -193,7 +193,7 @@ def _changes(values: dict[str, Any], library: MeshLibrary) -> dict[str, Any]:
             changes["image"] = images.load_image(library.folder / name)
     if "material" in changes:
         text_of(changes, "material", "name a material of the scene")
-    return changes
+    return textures.with_textures(changes, library.folder)
 
 
 def _step(name: str, value: Any) -> int:

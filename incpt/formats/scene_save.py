@@ -14,13 +14,15 @@ import numpy as np
 from incpt.core import files
 from incpt.core.checks import path_of, require
 from incpt.core.errors import InputError, InputWarning, one_line
-from incpt.formats import images, mesh_files, mesh_store
+from incpt.formats import bitmaps, images, mesh_files, mesh_store
 from incpt.formats.scene_toml import CAMERA_KEYS, VERSION
+from incpt.formats.textures import texture_value
 from incpt.scene.environment import Environment
 from incpt.scene.image import Image
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
+from incpt.scene.texture import Bitmap, Texture
 
 
 def save(scene: Scene, path: str | os.PathLike[str]) -> None:
@@ -55,6 +57,7 @@ class _Beside:
         self._stem = path.stem
         self._written: list[Path] = []
         self._names: dict[int, dict[str, str]] = {}
+        self._bitmaps: dict[int, dict[str, Any]] = {}
 
     def undo(self) -> None:
         """Removes what was written."""
@@ -96,6 +99,29 @@ class _Beside:
             self._written.append(path)
         return path.name
 
+    def bitmap(self, bitmap: Bitmap) -> dict[str, Any]:
+        """The keys of a texture that name its image."""
+        if id(bitmap) not in self._bitmaps:
+            self._bitmaps[id(bitmap)] = self._bitmap(bitmap)
+        return self._bitmaps[id(bitmap)]
+
+    def _bitmap(self, bitmap: Bitmap) -> dict[str, Any]:
+        source = bitmap.source
+        if source.file is not None:
+            try:
+                stored = bitmaps.load_bitmap(source.file, source.index)
+            except InputError:
+                stored = None
+            if stored is bitmap or (stored is not None and np.array_equal(stored.pixels, bitmap.pixels)):
+                number = {} if source.index is None else {"image": source.index}
+                return {"file": self._relative(source.file), **number}
+        digest, suffix = bitmaps.digest(bitmap), bitmaps.suffix_of(bitmap)
+        path = self._folder / f"{self._stem}.texture.{digest}{suffix}"
+        if not path.exists():
+            bitmaps.write_bitmap(path, bitmap)
+            self._written.append(path)
+        return {"file": path.name}
+
     def _relative(self, file: str) -> str:
         # `..` leaves the folder that a link points to, so links are resolved first.
         absolute = os.path.join(os.path.realpath(os.path.dirname(file)), os.path.basename(file))
@@ -117,10 +143,8 @@ def _mesh_on_disk(file: str, part: str | None) -> Mesh | None:
 def _same_mesh(a: Mesh, b: Mesh | None) -> bool:
     if b is None or a is b:
         return a is b
-    if (a.normals is None) != (b.normals is None):
-        return False
-    same_normals = a.normals is None or b.normals is None or np.array_equal(a.normals, b.normals)
-    return same_normals and np.array_equal(a.vertices, b.vertices) and np.array_equal(a.faces, b.faces)
+    first, second = mesh_store.arrays(a), mesh_store.arrays(b)
+    return first.keys() == second.keys() and all(np.array_equal(first[name], second[name]) for name in first)
 
 
 def _document(scene: Scene, beside: _Beside) -> str:
@@ -133,12 +157,12 @@ def _document(scene: Scene, beside: _Beside) -> str:
     document["version"] = VERSION
     document["camera"] = {name: _toml(getattr(scene.camera, name)) for name in CAMERA_KEYS}
     document["environment"] = _environment_table(scene.environment, beside)
-    render = _changed(scene.settings)
+    render = _changed(scene.settings, beside)
     if render:
         document["render"] = render
     if scene.materials:
         document["materials"] = {
-            name: {"base_color": _toml(material.base_color), **_changed(material)}
+            name: {"base_color": _toml(material.base_color), **_changed(material, beside)}
             for name, material in scene.materials.items()
         }
     if scene.objects:
@@ -170,14 +194,25 @@ def _object_table(obj: Object, beside: _Beside) -> dict[str, Any]:
     return table
 
 
-def _changed(owner: Any) -> dict[str, Any]:
+def _changed(owner: Any, beside: _Beside) -> dict[str, Any]:
     """The fields of a dataclass that differ from their defaults, as TOML has them."""
-    return {
-        field.name: _toml(getattr(owner, field.name))
+    changed = {
+        field.name: getattr(owner, field.name)
         for field in fields(owner)
         if field.default is MISSING or getattr(owner, field.name) != field.default
+    }
+    return {
+        name: _toml(texture_value(value, beside.bitmap) if isinstance(value, Texture) else value)
+        for name, value in changed.items()
     }
 
 
 def _toml(value: Any) -> Any:
+    if isinstance(value, dict):
+        # Tables in tables are written on one line, as people write them.
+        import tomlkit
+
+        table = tomlkit.inline_table()
+        table.update({key: _toml(item) for key, item in value.items()})
+        return table
     return [_toml(item) for item in value] if isinstance(value, tuple) else value

@@ -1,4 +1,4 @@
-"""Scene files: a Scene from TOML, version 1. `scene_save` writes them.
+"""Scene files: a Scene from TOML, version 2 or 1, which has no textures. `scene_save` writes them.
 
 Every value is checked where it stands, so that an error reads `scenes/a.toml: [[objects]] 3 ("red cube"):
 position: nan is not a finite number`. What a scene may hold is told by the dataclasses of `incpt.scene`
@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 from incpt.core.errors import InputError, in_place
 from incpt.core.settings import RenderSettings
-from incpt.formats import images
+from incpt.formats import images, textures
 from incpt.formats.mesh_library import MeshLibrary
 from incpt.formats.toml_kit import check_keys, quoted, read_toml, table_of, text_of
 from incpt.scene.camera import Camera
@@ -24,7 +24,9 @@ from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
 
 _T = TypeVar("_T")
-VERSION = 1
+VERSION = 2
+"""That is written."""
+_READ = (1, 2)
 _TABLES = ("version", "camera", "environment", "render", "materials", "objects")
 CAMERA_KEYS = tuple(field.name for field in fields(Camera))
 ENVIRONMENT_KEYS = tuple(field.name for field in fields(Environment))
@@ -45,7 +47,7 @@ def load_scene_toml(path: Path) -> Scene:
         environment = _environment(table_of(tables, "environment"), path.parent)
     with in_place("[render]"):
         settings = _built(RenderSettings, table_of(tables, "render"), RenderSettings.names())
-    materials = _materials(table_of(tables, "materials"))
+    materials = _materials(table_of(tables, "materials"), path.parent)
     objects = _objects(tables.get("objects", []), materials, path.parent)
     return Scene(camera, environment, materials, tuple(objects), settings)
 
@@ -54,8 +56,9 @@ def _check_version(tables: Mapping[str, Any]) -> None:
     if "version" not in tables:
         raise InputError(f"version: is missing; write `version = {VERSION}` in the first line")
     version = tables["version"]
-    if version != VERSION or isinstance(version, bool):
-        raise InputError(f"version: {version!r} cannot be read; this program reads version {VERSION}")
+    if version not in _READ or isinstance(version, (bool, float)):
+        known = " and ".join(map(str, _READ))
+        raise InputError(f"version: {version!r} cannot be read; this program reads versions {known}")
 
 
 def _built(kind: type[_T], table: Mapping[str, Any], known: Collection[str]) -> _T:
@@ -74,13 +77,14 @@ def _environment(table: dict[str, Any], folder: Path) -> Environment:
     return Environment(**values)
 
 
-def _materials(tables: dict[str, Any]) -> dict[str, Material]:
+def _materials(tables: dict[str, Any], folder: Path) -> dict[str, Material]:
     materials = {}
     for name, table in tables.items():
         with in_place(f"[materials.{name if name.isidentifier() else quoted(name)}]"):
             if not isinstance(table, dict):
                 raise InputError("is not a table; write its values below")
-            materials[name] = _built(Material, table, MATERIAL_KEYS)
+            check_keys(table, MATERIAL_KEYS)
+            materials[name] = Material(**textures.with_textures(table, folder))
     return materials
 
 

@@ -41,12 +41,16 @@ _PLANES = {
 _CLASSES = {path_list: PathClass[path_list.name] for path_list in PathList}
 """Which paths are in which list."""
 _LIGHTS = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS")
+_TEXTURES = ("TEXTURES", "VERTEX_COLORS")
 _FEATURES: Mapping[str | None, tuple[str, ...]] = {
+    "intersect": _TEXTURES,
     "shade_miss": (*_LIGHTS, "MEDIA"),
-    "sample_lights": _LIGHTS,
-    "touch_lights": _LIGHTS,
-    "shade_medium": _LIGHTS,
-    "shade": _LIGHTS,
+    "sample_lights": (*_LIGHTS, *_TEXTURES),
+    "touch_lights": (*_LIGHTS, *_TEXTURES),
+    "shade_medium": (*_LIGHTS, *_TEXTURES),
+    "shade": (*_LIGHTS, *_TEXTURES),
+    "write_aovs": _TEXTURES,
+    "first_hits": _TEXTURES,
 }
 """The features of a scene without which a kernel would leave something out. Those that would only make it
 quicker, as they do blocks, would be more variants to build."""
@@ -113,14 +117,14 @@ class Wavefront:
         """See `tracer.Tracer`."""
         for chunk in self._chunks(batch):
             self._generate(chunk)
-            self._launch_listed("intersect", chunk, 0, chunk.size, PathList.LIVE)
+            self._intersect(chunk, chunk.size)
             self._first_hits(chunk, surface, object_ids)
 
     def idle_launches(self, batch: Batch) -> list[Callable[[], None]]:
         """See `tracer.Tracer`."""
         chunk = self._chunk(batch, 0, 0)
         kernels = dict.fromkeys((one.kernel, one.features) for one in chunk.launches)
-        del kernels["intersect", ()]  # first hits need it too
+        del kernels["intersect", _chosen(batch.features, _TEXTURES)]  # first hits need it too
         return [
             *self.idle_first_hits(batch),
             *self._idle(
@@ -135,7 +139,7 @@ class Wavefront:
         return self._idle(
             [
                 partial(self._generate, chunk),
-                partial(self._launch_listed, "intersect", chunk, 0, 0, PathList.LIVE),
+                partial(self._intersect, chunk, 0),
                 partial(self._first_hits, chunk, nothing, nothing),
             ]
         )
@@ -196,11 +200,16 @@ class Wavefront:
         self.device.fill(self._lengths, 0, self._lengths.size)
         self._compact(chunk, 0, chunk.size, None, (PathList.LIVE,))
 
+    def _intersect(self, chunk: _Chunk, size: int) -> None:
+        """Trace the camera rays of a chunk."""
+        features = _chosen(chunk.batch.features, _TEXTURES)
+        self._launch_listed("intersect", chunk, 0, size, PathList.LIVE, features)
+
     def _first_hits(self, chunk: _Chunk, surface: cl.Buffer, object_ids: cl.Buffer) -> None:
         pixels = int(chunk.params["width"]) * int(chunk.params["height"])
-        self._launch(
-            "first_hits", chunk, chunk.size, pixels=pixels, first_surface=surface, object_ids=object_ids
-        )
+        features = _chosen(chunk.batch.features, _TEXTURES)
+        values = {"pixels": pixels, "first_surface": surface, "object_ids": object_ids}
+        self._launch("first_hits", chunk, chunk.size, features, **values)
 
     def _compact(
         self, chunk: _Chunk, ray: int, bound: int, source: PathList | None, targets: tuple[PathList, ...]
@@ -262,8 +271,13 @@ def _launches_of(features: tuple[str, ...]) -> tuple[_StageLaunch, ...]:
 def _features_of(stage: Stage, features: tuple[str, ...]) -> tuple[str, ...]:
     """Those that choose the variant of the stage's kernel."""
     if When.ENDS in stage.when:
-        return ("EMISSION_ONLY",)
-    return tuple(name for name in features if name in _FEATURES.get(stage.kernel, ()))
+        return ("EMISSION_ONLY", *_chosen(features, _TEXTURES))
+    return _chosen(features, _FEATURES.get(stage.kernel, ()))
+
+
+def _chosen(features: tuple[str, ...], names: tuple[str, ...]) -> tuple[str, ...]:
+    """Those of the features that have these names; some come with a number."""
+    return tuple(feature for feature in features if feature.split()[0] in names)
 
 
 def _length_place(path_list: PathList, ray: int) -> int:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import NoneType
 
 from incpt.core.affine import Vector
-from incpt.core.checks import require_bool, whole
+from incpt.core.checks import require, require_bool, whole
+from incpt.core.layout import TextureSlot
 from incpt.scene.checks import set_number, set_vector
+from incpt.scene.texture import Texture
 
 
 @dataclass(frozen=True)
@@ -16,6 +19,12 @@ class Material:
     GGX alpha is `roughness` squared. `absorption` is per metre inside a transmissive body, `priority`
     orders nested dielectrics (the higher wins, 0 is the highest of all), `emission` is radiance, from
     the front side only unless `double_sided`. `specular` scales the dielectric layer: 0 is Lambertian.
+
+    Numbers are multiplied with what their textures say at a point: `base_color_texture` and
+    `emission_texture` by colours in sRGB (where their bitmaps are bytes or 16-bit numbers),
+    `metallic_roughness_texture` by blue and green, `transmission_texture` by red, `specular_texture` by
+    alpha. `normal_texture` bends the shading normal: red and green, from 0 to 1, are its deflections along
+    the tangent and upwards in the image, from -1 to 1 and times `normal_scale`.
     """
 
     base_color: Vector = (0.8, 0.8, 0.8)
@@ -28,6 +37,13 @@ class Material:
     priority: int = 0
     emission: Vector = (0.0, 0.0, 0.0)
     double_sided: bool = False
+    normal_scale: float = 1.0
+    base_color_texture: Texture | None = None
+    metallic_roughness_texture: Texture | None = None
+    normal_texture: Texture | None = None
+    emission_texture: Texture | None = None
+    transmission_texture: Texture | None = None
+    specular_texture: Texture | None = None
 
     def __post_init__(self) -> None:
         set_vector(self, "base_color", low=0.0, high=1.0)
@@ -38,7 +54,22 @@ class Material:
         set_vector(self, "emission", low=0.0)
         object.__setattr__(self, "priority", whole("priority", self.priority, 0, 1000))
         require_bool("double_sided", self.double_sided)
+        set_number(self, "normal_scale", 0.0, 100.0)
+        for slot in TextureSlot:
+            name = texture_name(slot)
+            require(name, getattr(self, name), (Texture, NoneType), "a Texture")
 
     @property
     def is_emissive(self) -> bool:
         return any(c > 0 for c in self.emission)
+
+
+def texture_name(slot: TextureSlot) -> str:
+    """The parameter of a material that holds the texture of a slot."""
+    return f"{slot.name.lower()}_texture"
+
+
+def texture_of(material: Material, slot: TextureSlot) -> Texture | None:
+    """What a material reads for a slot, if anything."""
+    texture: Texture | None = getattr(material, texture_name(slot))
+    return texture

@@ -14,14 +14,12 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core.layout import ALBEDO_TABLE_SIZE, MIN_ALPHA
+from incpt.core.layout import ALBEDO_TABLE_SIZE, LEAST_ALBEDO_LOSS, MIN_ALPHA
 from incpt.scene.material import Material
 
 Array = npt.NDArray[np.floating]
 
 _SAMPLES = 1024
-_LEAST_LOSS = 1e-3
-"""Of light, below which nothing is made of what scatters again: the table knows no better."""
 
 
 @lru_cache(maxsize=1)
@@ -66,6 +64,15 @@ def _visible_normal(
     return [hx / length, hy / length, hz / length]
 
 
+@lru_cache(maxsize=1)
+def rows() -> npt.NDArray[np.float32]:
+    """(roughness, ALBEDO_ROW_SIZE): A at all cosines, B at all cosines, and their means over the hemisphere,
+    for materials whose textures change what the albedo depends on."""
+    a, b = table()
+    means = [[_mean(first), _mean(second)] for first, second in zip(a, b, strict=True)]
+    return np.concatenate([a, b, means], axis=1).astype(np.float32)
+
+
 def layer_row(material: Material) -> npt.NDArray[np.float32]:
     """(LAYER_SIZE,) the albedo by cosine of what reflects at once, layer and metal in their shares;
     1 / (1 - its mean over the hemisphere); and the colour of what scatters again on the metal in it."""
@@ -90,7 +97,7 @@ def _scattered_again(f0: Array, albedo: float) -> Array:
     """(3,) the share of the light lost to microfacets in the way that metal of reflectance `f0` sends back
     after all, where `albedo` is the mean share that is not lost: a series of reflections, each with the mean
     reflectance of Schlick's Fresnel term (Kulla and Conty 2017)."""
-    if 1 - albedo < _LEAST_LOSS:
+    if 1 - albedo < LEAST_ALBEDO_LOSS:
         return np.zeros(3)
     fresnel = f0 + (1 - f0) / 21
     return np.asarray(fresnel**2 * albedo / (1 - fresnel * (1 - albedo)))

@@ -12,18 +12,22 @@ from collections.abc import Iterable, Mapping
 from weakref import WeakKeyDictionary, WeakValueDictionary
 
 import numpy as np
+import numpy.typing as npt
 import pyopencl as cl
 
 from incpt.accel import bvh, quads
 from incpt.core import layout
 from incpt.device.device import Device
 from incpt.scene.mesh import Mesh
+from incpt.scene.tangents import corner_tangents
 from incpt.tables.range_buffer import Range, RangeBuffer
 
 _MOST_NODES = layout.NODE_LEAF
 _MOST_PACKS = layout.NODE_PACK // layout.BVH_WIDTH
 """The place of a hit is the place of its pack times BVH_WIDTH, and NODE_PACK is a flag above it."""
 _MOST_NORMALS = layout.NO_INDEX
+_CORNERS = {"uvs": "texture coordinates", "colors": "colours of corners", "tangents": "tangents"}
+"""Buffers of what meshes have at their corners beside normals."""
 
 
 class BuiltMesh:
@@ -46,6 +50,9 @@ class PooledMesh:
     def __init__(self, built: BuiltMesh, nodes: Range, packs: Range, normals: Range | None) -> None:
         self.built = built
         self._nodes, self._packs, self._normals = nodes, packs, normals
+        self.corners: dict[str, Range] = {}
+        """What it has at its corners beside normals, as far as some scene needs it: "uvs 0", "uvs 1",
+        "colors", and the tangents that go by a set of texture coordinates, "tangents 0" and "tangents 1"."""
 
     @property
     def place(self) -> tuple[int, int, int, int]:
@@ -53,6 +60,11 @@ class PooledMesh:
         buffers of the pool, until `GeometryPool.packings` changes."""
         normals = (0, 0) if self._normals is None else (self._normals.first, 1)
         return self._nodes.first, self._packs.first, *normals
+
+    def place_of(self, corners: str) -> tuple[int, int]:
+        """The first float of what it has at its corners, and 1; 0 and 0 where it has nothing."""
+        found = self.corners.get(corners)
+        return (0, 0) if found is None else (found.first, 1)
 
 
 class GeometryPool:
@@ -63,7 +75,13 @@ class GeometryPool:
         self._nodes = RangeBuffer(device, "nodes of trees", layout.NODE, _MOST_NODES)
         self._packs = RangeBuffer(device, "packs of triangles", layout.TRIANGLE_PACK, _MOST_PACKS)
         self._normals = RangeBuffer(device, "floats of normals", np.float32, _MOST_NORMALS)
-        self._buffers = {"nodes": self._nodes, "packs": self._packs, "normals": self._normals}
+        self._corners = {
+            name: RangeBuffer(device, f"floats of {what}", np.float32, _MOST_NORMALS)
+            for name, what in _CORNERS.items()
+        }
+        self._buffers = {
+            "nodes": self._nodes, "packs": self._packs, "normals": self._normals, **self._corners,
+        }  # fmt: skip
         self._built: WeakKeyDictionary[Mesh, BuiltMesh] = WeakKeyDictionary()
         self._built_by_content: WeakValueDictionary[bytes, BuiltMesh] = WeakValueDictionary()
         self._pooled: WeakValueDictionary[BuiltMesh, PooledMesh] = WeakValueDictionary()
@@ -82,9 +100,10 @@ class GeometryPool:
         return sum(ranges.packings for ranges in self._buffers.values())
 
     def buffer(self, name: str) -> cl.Buffer:
-        """The buffer of all nodes, packs or normals. It may be another one after the next `hold` or `shrink`,
-        so that every launch asks for it. One that was replaced keeps what it had, and nothing is written to
-        it any more: launches with buffers that were asked for together are right."""
+        """The buffer of all nodes, packs, normals, uvs, colors or tangents. It may be another one after the
+        next `hold` or `shrink`, so that every launch asks for it. One that was replaced keeps what it had,
+        and nothing is written to it any more: launches with buffers that were asked for together are
+        right."""
         return self._buffers[name].buffer
 
     def hold(self, meshes: Iterable[Mesh]) -> dict[Mesh, PooledMesh]:
@@ -103,6 +122,18 @@ class GeometryPool:
                 held[content] = pooled
         held.update(self._upload(missing))
         return {mesh: held[content] for mesh, content in built.items()}
+
+    def hold_corners(self, wanted: Mapping[tuple[Mesh, str], None], held: Mapping[Mesh, PooledMesh]) -> None:
+        """Upload what held meshes have at their corners, by the names of PooledMesh.corners, where it is not
+        there yet. It stays as long as its mesh does. Raises DeviceError where there is no room for it."""
+        missing: dict[str, dict[tuple[PooledMesh, str], npt.NDArray[np.float32]]] = {}
+        for mesh, name in wanted:
+            if name not in held[mesh].corners:
+                missing.setdefault(name.split()[0], {})[held[mesh], name] = _at_corners(mesh, name).ravel()
+        for kind, values in missing.items():
+            ranges = self._corners[kind].add(list(values.values()))
+            for (pooled, name), own in zip(values, ranges, strict=True):
+                pooled.corners[name] = own
 
     def refit(self, old: Mesh, new: Mesh) -> None:
         """Make the tree of `new`, which has the faces of `old`, by refitting that of `old`.
@@ -143,13 +174,23 @@ class GeometryPool:
         return uploaded
 
 
+def _at_corners(mesh: Mesh, name: str) -> npt.NDArray[np.float32]:
+    """What a mesh has at its corners under one of the names of PooledMesh.corners."""
+    kind, _, number = name.partition(" ")
+    if kind == "colors":
+        assert mesh.colors is not None
+        return mesh.colors
+    return mesh.uvs[int(number)] if kind == "uvs" else corner_tangents(mesh, int(number))
+
+
 _POOLS: WeakValueDictionary[Device, GeometryPool] = WeakValueDictionary()
 
 
 def _content_digest(mesh: Mesh) -> bytes:
-    """A digest of vertices, faces and normals. Meshes with the same one are taken for equal."""
+    """A digest of all that a mesh has. Meshes with the same one are taken for equal."""
     digest = hashlib.blake2b(digest_size=16)
-    for array in (mesh.vertices, mesh.faces, mesh.normals):
+    uvs = (*mesh.uvs, None, None)[:2]
+    for array in (mesh.vertices, mesh.faces, mesh.normals, *uvs, mesh.colors, mesh.tangents):
         digest.update(b"" if array is None else str(array.shape).encode())
         digest.update(b"" if array is None else array.data)
     return digest.digest()

@@ -6,26 +6,39 @@ chances: those of either scene. In the scene that lacks a light, it emits nothin
 
 What the law of multiple importance sampling needs holds in each scene: a point on an emitter is chosen with
 the density that its material has (`LightTables.densities`), because all that has a material of that name has
-the same weight per area in both scenes, the larger of its two.
+the same weight per area in both scenes, the larger of its two. The same goes for the share of a face in it,
+where emission has a texture in one of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from incpt.core import layout
+from incpt.core.layout import TextureSlot
 from incpt.device.device import Device
+from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
 from incpt.tables import lights
+from incpt.tables.emitter_shares import face_shares
 from incpt.tables.lights import Array, LightTables, TriangleLights
+from incpt.tables.textures import TextureTables
 
 _SAME_AREA = 1e-6
 """By how much, relatively, the areas of a triangle in both scenes may differ where it is one light: what
 moving it leaves of rounding errors."""
+
+
+_PLAIN = Material()
+
+
+def _untextured(material: Material) -> int:
+    """The number of white, in place of a texture."""
+    return 0
 
 
 def has_same_emitters(old: Scene, new: Scene) -> bool:
@@ -35,19 +48,32 @@ def has_same_emitters(old: Scene, new: Scene) -> bool:
         found: list[tuple[object, ...]] = []
         for obj in lights.emissive_objects(scene):
             material = scene.materials[obj.material]
-            found.append((id(obj.mesh), obj.transform, material.emission, material.double_sided))
+            found.append(
+                (
+                    id(obj.mesh),
+                    obj.transform,
+                    material.emission,
+                    material.double_sided,
+                    material.emission_texture,
+                )
+            )
         return found
 
     return seen(old) == seen(new)
 
 
 def paired_light_tables(
-    device: Device, old: Scene, new: Scene, has_image: bool
+    device: Device, old: Scene, new: Scene, has_image: bool, textures: tuple[TextureTables, TextureTables]
 ) -> tuple[LightTables, LightTables]:
     """The light tables of both scenes; `has_image` tells whether their environment has an image that shines.
-    Raises DeviceError."""
-    first, second = paired_lights(old, new, lights.share_of_triangles(has_image))
-    return LightTables.of(device, first, has_image), LightTables.of(device, second, has_image)
+    `textures` are those of both. Raises DeviceError."""
+    numbers = (textures[0].emission_number, textures[1].emission_number)
+    pair = paired_lights(old, new, lights.share_of_triangles(has_image), numbers)
+    first, second = (
+        LightTables.of(device, triangles, has_image, scene.objects, own.has(TextureSlot.EMISSION))
+        for triangles, scene, own in zip(pair, (old, new), textures, strict=True)
+    )
+    return first, second
 
 
 def common_weights(old: Scene, new: Scene) -> dict[str, float]:
@@ -59,12 +85,18 @@ def common_weights(old: Scene, new: Scene) -> dict[str, float]:
     return weights
 
 
-def paired_lights(old: Scene, new: Scene, share: float) -> tuple[TriangleLights, TriangleLights]:
+def paired_lights(
+    old: Scene,
+    new: Scene,
+    share: float,
+    texture_numbers: tuple[Callable[[Material], int], Callable[[Material], int]] = (_untextured, _untextured),
+) -> tuple[TriangleLights, TriangleLights]:
     """The lights of both scenes, the same ones in the same order; see `lights.triangle_lights`. Those that
-    differ have LightFlag.CHANGED."""
+    differ have LightFlag.CHANGED. `texture_numbers` are those of materials in both scenes."""
     weights = common_weights(old, new)
-    rows = _Rows.joined(_rows(old, new, weights)).chosen()
-    power = rows.weight * rows.area
+    shares = _shares(old, new, weights)
+    rows = _Rows.joined(_rows(old, new, weights, shares, texture_numbers)).chosen()
+    power = rows.weight * rows.share * rows.area
     if len(power) == 0:
         nothing = TriangleLights(np.zeros((len(layout.LightPlane), 0), np.float32), {})
         return nothing, nothing
@@ -75,34 +107,71 @@ def paired_lights(old: Scene, new: Scene, share: float) -> tuple[TriangleLights,
             lights.light_planes(
                 rows.corners[i],
                 rows.emission[i],
-                np.where(rows.shines[i], rows.weight * scale, 0),
+                np.where(rows.shines[i], rows.weight * rows.share * scale, 0),
                 power,
                 rows.flags(i),
                 rows.errors[i],
             ),
             densities,
+            shares[i],
         )
         for i in range(2)
     )
+    for i, triangles in enumerate((first, second)):
+        lights.set_textures(triangles.planes, rows.texture[i], rows.places[i])
     return first, second
+
+
+def _shares(
+    old: Scene, new: Scene, weights: Mapping[str, float]
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Of both scenes, by the names of objects: the shares of faces in the density of their material, where
+    any are not 1. Those of faces that are lights of both scenes are the same, the larger of the two."""
+    found: tuple[dict[str, Array], dict[str, Array]] = {}, {}
+    before, after = _seen(old, weights), _seen(new, weights)
+    for key in [*before, *(key for key in after if key not in before)]:
+        a, b = before.get(key), after.get(key)
+        own = {
+            i: face_shares(obj.mesh, scene.materials[key[1]])
+            for i, (obj, scene) in enumerate(((a, old), (b, new)))
+            if obj is not None
+        }
+        same = None if a is None or b is None else _same_faces(_Triangles.of(a), _Triangles.of(b))
+        if same is not None:
+            larger = np.maximum(own[0], own[1])
+            own = {i: np.where(same, larger, values) for i, values in own.items()}
+        for i, values in own.items():
+            if (values != 1).any():
+                found[i][key[0]] = values
+    return found
 
 
 @dataclass(frozen=True, eq=False)
 class _Triangles:
-    """Those of an object: `corners` (F, 3, 3) and `errors` (F, 3), see `_Rows`."""
+    """Those of an object: `corners` (F, 3, 3), `errors` (F, 3), `share` (F,) and `places` (F, 3, 2), see
+    `_Rows`."""
 
     corners: Array
     errors: Array
+    share: Array
+    places: Array
 
     @classmethod
-    def of(cls, obj: Object) -> _Triangles:
-        return cls(lights.world_corners(obj), lights.transform_errors(obj))
+    def of(cls, obj: Object, share: Array | None = None, material: Material = _PLAIN) -> _Triangles:
+        """Those of an object; 1 are the shares of its faces where none are given."""
+        faces = len(obj.mesh.faces)
+        return cls(
+            lights.world_corners(obj),
+            lights.transform_errors(obj),
+            np.ones(faces) if share is None else share,
+            lights.texture_places(obj, material),
+        )
 
     def __getitem__(self, chosen: npt.NDArray[np.bool_]) -> _Triangles:
-        return _Triangles(self.corners[chosen], self.errors[chosen])
+        return _Triangles(self.corners[chosen], self.errors[chosen], self.share[chosen], self.places[chosen])
 
 
-_NO_TRIANGLES = _Triangles(np.zeros((0, 3, 3)), np.zeros((0, 3)))
+_NO_TRIANGLES = _Triangles(np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3, 2)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +183,11 @@ class _Rows:
     emission      (2, N, 3); 0 where a scene lacks it.
     double_sided  (2, N)
     weight        (N,) per area
+    share         (N,) of that
     material      (N,) its name
+    texture       (2, N) numbers of the textures of emission
+    places        (2, N, 3, 2) texture coordinates at the corners
+    has_other_texture  (N,) whether the textures of both scenes differ
     """
 
     corners: Array
@@ -122,7 +195,11 @@ class _Rows:
     emission: Array
     double_sided: npt.NDArray[np.bool_]
     weight: Array
+    share: Array
     material: npt.NDArray[np.object_]
+    texture: npt.NDArray[np.uint32]
+    places: Array
+    has_other_texture: npt.NDArray[np.bool_]
 
     @classmethod
     def joined(cls, parts: list[_Rows]) -> _Rows:
@@ -133,19 +210,27 @@ class _Rows:
             np.concatenate([part.emission for part in every], axis=1),
             np.concatenate([part.double_sided for part in every], axis=1),
             np.concatenate([part.weight for part in every]),
+            np.concatenate([part.share for part in every]),
             np.concatenate([part.material for part in every]),
+            np.concatenate([part.texture for part in every], axis=1),
+            np.concatenate([part.places for part in every], axis=1),
+            np.concatenate([part.has_other_texture for part in every]),
         )
 
     def chosen(self) -> _Rows:
         """Those that are large and bright enough to be lights."""
-        kept = (self.area >= lights.SMALLEST_AREA) & (self.weight >= lights.SMALLEST_WEIGHT)
+        kept = (self.area >= lights.SMALLEST_AREA) & (self.weight * self.share >= lights.SMALLEST_WEIGHT)
         return _Rows(
             self.corners[:, kept],
             self.errors[:, kept],
             self.emission[:, kept],
             self.double_sided[:, kept],
             self.weight[kept],
+            self.share[kept],
             self.material[kept],
+            self.texture[:, kept],
+            self.places[:, kept],
+            self.has_other_texture[kept],
         )
 
     @property
@@ -163,6 +248,7 @@ class _Rows:
             axis=1
         )
         changed |= self.double_sided[0] != self.double_sided[1]
+        changed |= self.has_other_texture | (self.places[0] != self.places[1]).any(axis=(1, 2))
         flag = layout.LightFlag
         return np.asarray(
             self.double_sided[scene] * np.uint32(flag.DOUBLE_SIDED) + changed * np.uint32(flag.CHANGED),
@@ -170,25 +256,42 @@ class _Rows:
         )
 
 
-def _rows(old: Scene, new: Scene, weights: Mapping[str, float]) -> list[_Rows]:
+def _rows(
+    old: Scene,
+    new: Scene,
+    weights: Mapping[str, float],
+    shares: tuple[Mapping[str, Array], Mapping[str, Array]],
+    texture_numbers: tuple[Callable[[Material], int], Callable[[Material], int]],
+) -> list[_Rows]:
     """Those of each object that is seen and emits in one of the scenes. They are lights of both where it has
     its name, its material and their area in both."""
     before, after = _seen(old, weights), _seen(new, weights)
     found = []
     for key in [*before, *(key for key in after if key not in before)]:
-        a, b = before.get(key), after.get(key)
-        first, second = (None if obj is None else _Triangles.of(obj) for obj in (a, b))
+        first, second = (
+            None if obj is None else _Triangles.of(obj, own.get(key[0]), scene.materials[key[1]])
+            for obj, scene, own in zip((before.get(key), after.get(key)), (old, new), shares, strict=True)
+        )
         weight = weights[key[1]]
-        if first is not None and second is not None and len(first.corners) == len(second.corners):
-            before_it, after_it = lights.areas(first.corners), lights.areas(second.corners)
-            same = np.isclose(before_it, after_it, rtol=_SAME_AREA, atol=0)
-            found.append(_row(old, new, key[1], first[same], second[same], weight))
-            first, second = first[~same], second[~same]
+        if first is not None and second is not None:
+            same = _same_faces(first, second)
+            if same is not None:
+                found.append(_row(old, new, key[1], first[same], second[same], weight, texture_numbers))
+                first, second = first[~same], second[~same]
         if first is not None:
-            found.append(_row(old, None, key[1], first, first, weight))
+            found.append(_row(old, None, key[1], first, first, weight, texture_numbers))
         if second is not None:
-            found.append(_row(None, new, key[1], second, second, weight))
+            found.append(_row(None, new, key[1], second, second, weight, texture_numbers))
     return found
+
+
+def _same_faces(first: _Triangles, second: _Triangles) -> npt.NDArray[np.bool_] | None:
+    """(F,) which triangles of an object have the same area in both scenes; None where their numbers
+    differ."""
+    if len(first.corners) != len(second.corners):
+        return None
+    before, after = lights.areas(first.corners), lights.areas(second.corners)
+    return np.isclose(before, after, rtol=_SAME_AREA, atol=0)
 
 
 def _seen(scene: Scene, weights: Mapping[str, float]) -> dict[tuple[str, str], Object]:
@@ -198,20 +301,37 @@ def _seen(scene: Scene, weights: Mapping[str, float]) -> dict[tuple[str, str], O
 
 
 def _row(
-    old: Scene | None, new: Scene | None, name: str, first: _Triangles, second: _Triangles, weight: float
+    old: Scene | None,
+    new: Scene | None,
+    name: str,
+    first: _Triangles,
+    second: _Triangles,
+    weight: float,
+    texture_numbers: tuple[Callable[[Material], int], Callable[[Material], int]] = (_untextured, _untextured),
 ) -> _Rows:
     """Triangles with the material of that name in the scenes that are given."""
     count = len(first.corners)
     emission, double_sided = np.zeros((2, count, 3)), np.zeros((2, count), np.bool_)
+    texture = np.zeros((2, count), np.uint32)
     for i, scene in enumerate((old, new)):
         if scene is not None:
             material = scene.materials[name]
             emission[i], double_sided[i] = material.emission, material.double_sided
+            texture[i] = texture_numbers[i](material)
+    has_other = (
+        old is not None
+        and new is not None
+        and old.materials[name].emission_texture != new.materials[name].emission_texture
+    )
     return _Rows(
         np.stack([first.corners, second.corners]),
         np.stack([first.errors, second.errors]),
         emission,
         double_sided,
         np.full(count, weight),
+        first.share,
         np.full(count, name, np.object_),
+        texture,
+        np.stack([first.places, second.places]),
+        np.full(count, has_other),
     )

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
 from incpt.core import affine, layout
+from incpt.core.layout import TextureSlot
 from incpt.device.device import Device
 from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
+from incpt.tables.emitter_shares import corner_places, face_shares
+from incpt.tables.textures import TextureTables
 
 Array = npt.NDArray[np.float64]
 
@@ -41,10 +44,12 @@ def radiant_weight(material: Material) -> float:
 
 @dataclass(frozen=True, eq=False)
 class TriangleLights:
-    """`planes` (len(LightPlane), N) float32, uints bit for bit; `densities` as in LightTables."""
+    """`planes` (len(LightPlane), N) float32, uints bit for bit; `densities` as in LightTables; `shares`: by
+    the name of an object whose emission has a texture, those of its faces in the density (F,)."""
 
     planes: npt.NDArray[np.float32]
     densities: Mapping[str, float]
+    shares: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -56,8 +61,9 @@ class LightTables:
     """The buffers, by name, and how light sampling chooses.
 
     count                    how many triangles there are to choose from
-    densities                density per area of choosing a point, by the name of its material. Others have 0:
-                             their points are left to the rays that meet them
+    densities                density per area of choosing a point, by the name of its material, but for the
+                             share of its face (`emitter_shares`). Others have 0: their points are left to
+                             the rays that meet them
     environment_probability  the chance that light sampling turns to the environment's image
     """
 
@@ -67,18 +73,45 @@ class LightTables:
     environment_probability: float
 
     @classmethod
-    def of(cls, device: Device, triangles: TriangleLights, has_image: bool) -> LightTables:
+    def of(
+        cls,
+        device: Device,
+        triangles: TriangleLights,
+        has_image: bool,
+        objects: tuple[Object, ...],
+        is_textured: bool,
+    ) -> LightTables:
         """Those of triangles that were chosen with `share_of_triangles`; `has_image` tells whether the
-        environment has an image that shines."""
+        environment has an image that shines. `objects` are those of the scene; `is_textured` tells whether
+        any material has a texture of emission."""
         share = share_of_triangles(has_image) if triangles.count else 0.0
         probability = 1.0 - share if has_image else 0.0
-        buffers = {"lights": device.upload(triangles.planes)}
+        first, shares = _share_tables(triangles.shares, objects if is_textured else ())
+        planes = triangles.planes if is_textured else triangles.planes[: layout.LightPlane.TEXTURE]
+        buffers = {
+            "lights": device.upload(planes),
+            "first_share": device.upload(first),
+            "emitter_shares": device.upload(shares),
+        }
         return cls(buffers, triangles.count, triangles.densities, probability)
 
 
-def light_tables(device: Device, scene: Scene, has_image: bool) -> LightTables:
+def _share_tables(
+    shares: Mapping[str, Array], objects: tuple[Object, ...]
+) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.float32]]:
+    """Where the shares of each object's faces begin, and all shares behind a 1, which others have."""
+    place, places = 1, {}
+    for name, values in shares.items():
+        places[name] = place
+        place += len(values)
+    first = np.array([places.get(obj.name, 0) for obj in objects] or [0], np.uint32)
+    return first, np.concatenate([[1.0], *shares.values()]).astype(np.float32)
+
+
+def light_tables(device: Device, scene: Scene, has_image: bool, textures: TextureTables) -> LightTables:
     """Those of a scene; `has_image` tells whether its environment has an image that shines."""
-    return LightTables.of(device, triangle_lights(scene, share_of_triangles(has_image)), has_image)
+    triangles = triangle_lights(scene, share_of_triangles(has_image), textures.emission_number)
+    return LightTables.of(device, triangles, has_image, scene.objects, textures.has(TextureSlot.EMISSION))
 
 
 def share_of_triangles(has_image: bool) -> float:
@@ -86,9 +119,12 @@ def share_of_triangles(has_image: bool) -> float:
     return 0.5 if has_image else 1.0
 
 
-def triangle_lights(scene: Scene, share: float) -> TriangleLights:
+def triangle_lights(
+    scene: Scene, share: float, texture_number: Callable[[Material], int] = lambda material: 0
+) -> TriangleLights:
     """Every visible emissive triangle that is large and bright enough. `share` is the chance that light
-    sampling turns to triangles at all; the densities contain it."""
+    sampling turns to triangles at all; the densities contain it. `texture_number` is that of the texture of a
+    material's emission."""
     objects = emissive_objects(scene)
     if not objects:
         return TriangleLights(np.zeros((len(layout.LightPlane), 0), np.float32), {})
@@ -98,17 +134,49 @@ def triangle_lights(scene: Scene, share: float) -> TriangleLights:
     area = areas(corners)
     owner = np.repeat(np.arange(len(objects)), [len(obj.mesh.faces) for obj in objects])
     weights = np.array([radiant_weight(material) for material in materials])
-    kept = (area >= SMALLEST_AREA) & (weights >= SMALLEST_WEIGHT)[owner]
-    owner, power = owner[kept], weights[owner[kept]] * area[kept]
+    shares = [face_shares(obj.mesh, material) for obj, material in zip(objects, materials, strict=True)]
+    share_of_face = np.concatenate(shares)
+    kept = (area >= SMALLEST_AREA) & (weights[owner] * share_of_face >= SMALLEST_WEIGHT)
+    owner, share_of_face = owner[kept], share_of_face[kept]
+    power = weights[owner] * share_of_face * area[kept]
     if len(owner) == 0:
         return TriangleLights(np.zeros((len(layout.LightPlane), 0), np.float32), {})
 
     density = weights * (share / float(power.sum()))
     emission = np.array([material.emission for material in materials])
     sides = np.array([material.double_sided for material in materials]) * layout.LightFlag.DOUBLE_SIDED
-    planes = light_planes(corners[kept], emission[owner], density[owner], power, sides[owner], errors[kept])
+    planes = light_planes(
+        corners[kept], emission[owner], density[owner] * share_of_face, power, sides[owner], errors[kept]
+    )
+    numbers = np.array([texture_number(material) for material in materials], np.uint32)
+    places = np.concatenate([texture_places(obj, materials[i]) for i, obj in enumerate(objects)])
+    set_textures(planes, numbers[owner], places[kept])
     lit = np.flatnonzero(np.bincount(owner)).tolist()
-    return TriangleLights(planes, {objects[i].material: float(density[i]) for i in lit})
+    return TriangleLights(
+        planes,
+        {objects[i].material: float(density[i]) for i in lit},
+        {obj.name: own for obj, own, number in zip(objects, shares, numbers, strict=True) if number},
+    )
+
+
+def set_textures(planes: npt.NDArray[np.float32], numbers: npt.NDArray[np.uint32], places: Array) -> None:
+    """Fill in the textures of lights: their numbers (N,), and texture coordinates (N, 3, 2) at the
+    corners."""
+    plane = layout.LightPlane
+    planes[plane.TEXTURE] = numbers.view(np.float32)
+    planes[plane.U : plane.V + 1] = places[:, 0].T
+    planes[plane.EDGE_1_U : plane.EDGE_1_V + 1] = (places[:, 1] - places[:, 0]).T
+    planes[plane.EDGE_2_U : plane.EDGE_2_V + 1] = (places[:, 2] - places[:, 0]).T
+
+
+def texture_places(obj: Object, material: Material) -> Array:
+    """(F, 3, 2) texture coordinates of its material's emission at `world_corners`."""
+    places = corner_places(obj.mesh, material.emission_texture)
+    return places[:, [0, 2, 1]] if _is_mirrored(obj) else places
+
+
+def _is_mirrored(obj: Object) -> bool:
+    return bool(np.linalg.det(obj.world_from_object[:, :3]) < 0)
 
 
 def light_planes(
@@ -168,8 +236,7 @@ def areas(corners: Array) -> Array:
 def world_corners(obj: Object) -> Array:
     """(F, 3, 3) of its triangles, in world space, counter-clockwise from outside."""
     # A mirrored face keeps its outside: two corners change places to keep it on the normal's side.
-    mirrored = np.linalg.det(obj.world_from_object[:, :3]) < 0
-    faces = obj.mesh.faces[:, [0, 2, 1]] if mirrored else obj.mesh.faces
+    faces = obj.mesh.faces[:, [0, 2, 1]] if _is_mirrored(obj) else obj.mesh.faces
     return np.asarray(affine.apply(obj.world_from_object, obj.mesh.vertices)[faces])
 
 

@@ -12,9 +12,10 @@ from incpt.core import layout
 from incpt.device.device import Device
 from incpt.scene.material import Material
 from incpt.tables import albedo
+from incpt.tables.textures import TextureTables
 
 _COPIED = ("base_color", "metallic", "emission", "roughness", "absorption", "specular", "ior", "transmission",
-           "priority")  # fmt: skip
+           "priority", "normal_scale")  # fmt: skip
 """What rows take over from materials as it is."""
 
 
@@ -36,9 +37,13 @@ class MaterialTables:
 
 
 def material_tables(
-    device: Device, materials: Mapping[str, Material], densities: Mapping[str, float]
+    device: Device,
+    materials: Mapping[str, Material],
+    densities: Mapping[str, float],
+    textures: TextureTables,
 ) -> MaterialTables:
-    """Those of `materials`, numbered in order. `densities` are those of LightTables."""
+    """Those of `materials`, numbered in order. `densities` are those of LightTables; `textures` are of these
+    materials."""
     # One row at least: rays that miss read material 0.
     rows = np.zeros(max(len(materials), 1), layout.MATERIAL)
     layers = np.zeros((len(rows), layout.LAYER_SIZE), np.float32)
@@ -50,6 +55,7 @@ def material_tables(
         row["flags"] = (flags.DOUBLE_SIDED if material.double_sided else 0) | (
             flags.TRANSMISSIVE if material.transmission > 0 else 0
         )
+        row["textures"] = textures.numbers_of(material)
         layer[:] = albedo.layer_row(material)
     media = [material for material in materials.values() if material.transmission > 0]
     # Of a material that lets all light through no opaque surface is ever shaded.

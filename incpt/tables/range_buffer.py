@@ -109,8 +109,8 @@ class RangeBuffer:
         needed = used + count
         if needed > self.most:
             raise DeviceError(
-                f"device memory: meshes need {needed:,} {self.name}, and kernels can address "
-                f"{self.most:,}; use smaller meshes, or fewer of them"
+                f"device memory: the scene needs {needed:,} {self.name}, and kernels can address "
+                f"{self.most:,}; use smaller meshes and images, or fewer of them"
             )
         try:
             self._pack(ranges, max(self._capacity, min(int(needed * _ROOM), self.most)))

@@ -23,12 +23,14 @@ from incpt.scene.enclosing import transparent_bodies_around
 from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Scene
+from incpt.tables.attributes import AttributeTable, attribute_table
 from incpt.tables.environment import EnvironmentTables, environment_tables
 from incpt.tables.geometry_pool import GeometryPool, PooledMesh
 from incpt.tables.light_pairs import has_same_emitters, paired_light_tables
 from incpt.tables.lights import LightTables, light_tables
 from incpt.tables.materials import MaterialTables, material_tables
 from incpt.tables.object_table import NO_OBJECTS, PlacedObjects
+from incpt.tables.textures import TextureTables, texture_tables
 from incpt.tables.top_level import TopLevelTables, top_level_tables
 
 _Part = TypeVar("_Part")
@@ -47,20 +49,26 @@ class SceneTables:
     objects: PlacedObjects
     top_level: TopLevelTables
     environment: EnvironmentTables
+    textures: TextureTables
+    attributes: AttributeTable
     lights: LightTables
     materials: MaterialTables
     unpaired: SceneTables | None = None
 
     def buffer(self, name: str) -> cl.Buffer:
         """One of the buffers: nodes, objects, materials, layers ... as it is now; see GeometryPool.buffer."""
-        if name == "objects":
-            return self.objects.buffer
+        # These may be others after a pool has moved what it holds.
+        if name in ("objects", "textures", "attributes"):
+            placed: PlacedObjects | TextureTables | AttributeTable = getattr(self, name)
+            return placed.buffer
+        if name == "texels":
+            return self.textures.pool.texels
         return self._own_buffers.get(name) or self.pool.buffer(name)
 
     @cached_property
     def _own_buffers(self) -> Mapping[str, cl.Buffer]:
         """Those that never change, since no other scene has a part in them."""
-        parts = (self.top_level, self.environment, self.lights, self.materials)
+        parts = (self.top_level, self.environment, self.textures.pool, self.lights, self.materials)
         return {name: buffer for part in parts for name, buffer in part.buffers.items()}
 
     @cached_property
@@ -82,8 +90,10 @@ class SceneTables:
             "CLEAR_MEDIA": materials.has_media and materials.is_media_clear,
             "MATTE": materials.is_matte,
             "BRUTE_FORCE": top_level.is_brute_force,
+            "VERTEX_COLORS": self.attributes.has_colors,
         }
-        return (*self.features, *(name for name, holds in names.items() if holds))
+        textures = (f"TEXTURES {self.textures.slots}u",) if self.textures.slots else ()
+        return (*self.features, *textures, *(name for name, holds in names.items() if holds))
 
     @property
     def has_media(self) -> bool:
@@ -172,12 +182,13 @@ def paired_tables(
     if has_same_emitters(old, new):
         return first, second
     device, has_image = pool.device, _has_image_light(old, first.environment)
-    pairs = zip((first, second), paired_light_tables(device, old, new, has_image), strict=True)
+    textures = first.textures, second.textures
+    pairs = zip((first, second), paired_light_tables(device, old, new, has_image, textures), strict=True)
     before, after = (
         replace(
             tables,
             lights=lights,
-            materials=material_tables(device, tables.scene.materials, lights.densities),
+            materials=material_tables(device, tables.scene.materials, lights.densities, tables.textures),
             unpaired=tables,
         )
         for tables, lights in pairs
@@ -215,11 +226,17 @@ def _make(pool: GeometryPool, scene: Scene, previous: SceneTables | None) -> Sce
         lambda: top_level_tables(device, objects.table, lambda mesh: meshes[mesh].built.quads(mesh)),
     )
     environment = part("environment", lambda: environment_tables(device, scene.environment.image))
-    # Lights need the environment, and materials the densities of the lights.
+    textures = part("textures", lambda: texture_tables(device, scene.materials))
+    attributes = part("attributes", lambda: attribute_table(pool, scene, meshes, textures.slots != 0))
+    # Lights need the environment, and materials the densities of the lights; both need the textures.
     has_image_light = _has_image_light(scene, environment)
-    lights = part("lights", lambda: light_tables(device, scene, has_image_light))
-    materials = part("materials", lambda: material_tables(device, scene.materials, lights.densities))
-    return SceneTables(pool, scene, meshes, objects, top_level, environment, lights, materials)
+    lights = part("lights", lambda: light_tables(device, scene, has_image_light, textures))
+    materials = part(
+        "materials", lambda: material_tables(device, scene.materials, lights.densities, textures)
+    )
+    return SceneTables(
+        pool, scene, meshes, objects, top_level, environment, textures, attributes, lights, materials
+    )
 
 
 def _has_image_light(scene: Scene, environment: EnvironmentTables) -> bool:
@@ -241,8 +258,18 @@ def _objects_changed(change: Change) -> bool:
 
 def _emission_changed(change: Change) -> bool:
     # Whatever may touch an emissive triangle; cheap where there are few of them.
-    return bool(change.objects or change.materials or change.environment or change.environment_image
-                or change.materials_added_or_removed)  # fmt: skip
+    return bool(change.objects or change.reordered or change.environment or change.environment_image
+                or _materials_changed(change))  # fmt: skip
+
+
+def _materials_changed(change: Change) -> bool:
+    return bool(change.materials or change.materials_added_or_removed)
+
+
+def _attributes_changed(change: Change) -> bool:
+    return bool(
+        _shapes_changed(change) or change.reordered or change.reassigned or _materials_changed(change)
+    )
 
 
 _REBUILT_BY: Mapping[str, Callable[[Change], bool]] = {
@@ -250,6 +277,8 @@ _REBUILT_BY: Mapping[str, Callable[[Change], bool]] = {
     "objects": _objects_changed,
     "top_level": _places_changed,
     "environment": lambda change: change.environment_image,
+    "textures": _materials_changed,
+    "attributes": _attributes_changed,
     "lights": _emission_changed,
     "materials": _emission_changed,
 }

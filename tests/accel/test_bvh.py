@@ -87,7 +87,9 @@ class World:
             "objects": records,
             "normals": np.concatenate(normals or [np.zeros(9, np.float32)]),
             "materials": material,
-            "layers": np.zeros(1, np.float32),
+        }
+        tables |= {
+            a.name: np.zeros(1, np.float32) for a in bindings.SHADING.arguments if a.name not in tables
         }
         self.buffers = {name: self.device.upload(table) for name, table in tables.items()}
 

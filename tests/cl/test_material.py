@@ -15,6 +15,7 @@ from incpt.core import layout
 from incpt.scene.material import Material
 from incpt.tables import albedo
 from incpt.tables.materials import material_tables
+from incpt.tables.textures import texture_tables
 
 COUNT = 1 << 16
 Array = npt.NDArray[np.floating]
@@ -34,13 +35,14 @@ MATERIALS = {
 }
 ANGLES_DEG = (0.0, 35.0, 70.0, 86.0)
 
-_SURFACE = "OpaqueBsdf s = bsdf_of(material, layer, multiple[0]); Vec3 wo = vec3(ox[i], oy[i], oz[i]);"
+_SURFACE = """SurfaceMaterial m = plain_material(material);
+    OpaqueBsdf s = bsdf_of(&m, layer, albedos, multiple[0]); Vec3 wo = vec3(ox[i], oy[i], oz[i]);"""
 
 
 def _arguments(material: Material, multiple: float = 1.0) -> dict[str, npt.NDArray[np.generic]]:
     values = {k: v for k, v in asdict(material).items() if k in (layout.MATERIAL.names or ())}
     return {"material": struct_rows(layout.MATERIAL, [values]), "layer": albedo.layer_row(material),
-            "multiple": np.float32([multiple])}  # fmt: skip
+            "albedos": albedo.rows(), "multiple": np.float32([multiple])}  # fmt: skip
 
 
 def _components(prefix: str, w: Array, count: int) -> dict[str, npt.NDArray[np.float32]]:
@@ -280,4 +282,5 @@ def test_scenes_are_matte_where_the_variant_makes_no_difference(name: str) -> No
         for features in ((), ("MATTE",))
     )
     is_same = np.allclose(variant, general, rtol=1e-5, atol=1e-7)
-    assert material_tables(device(), {"one": material}, {}).is_matte == is_same
+    textures = texture_tables(device(), {"one": material})
+    assert material_tables(device(), {"one": material}, {}, textures).is_matte == is_same

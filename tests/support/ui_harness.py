@@ -24,6 +24,7 @@ from incpt.render.modes import Mode
 from incpt.scene.image import Image
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Scene
+from incpt.scene.texture import Bitmap
 from incpt.scene.transform import Transform
 from incpt.ui.commands import command, menus, table
 from incpt.ui.editor.document import Document
@@ -296,7 +297,7 @@ def acknowledge_textures() -> None:
 
 def flat(value: Any, place: str = "") -> dict[str, Any]:
     """Every number, text and array of a scene or of preferences by its place: "objects.cube.position.0"."""
-    if isinstance(value, (Mesh, Image)) or value is None:
+    if isinstance(value, (Mesh, Image, Bitmap)) or value is None:
         return {place: value}
     if is_dataclass(value):
         parts: Iterator[tuple[str, Any]] = ((f.name, getattr(value, f.name)) for f in fields(value))

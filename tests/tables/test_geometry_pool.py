@@ -53,7 +53,7 @@ def built(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 def used(pool: GeometryPool) -> tuple[int, int, int]:
     """Nodes, packs, and floats of normals that are taken."""
-    nodes, packs, normals = (ranges.used for ranges in pool._buffers.values())
+    nodes, packs, normals = (pool._buffers[name].used for name in ("nodes", "packs", "normals"))
     return nodes, packs, normals
 
 

@@ -110,7 +110,7 @@ def _sample_triangles(scene: Scene, share: float = 1.0) -> tuple[Array, Array, A
     u, v, choice = uniforms(COUNT, 3, 31)
     body = """Uniform2 uv; uv.u = u[i]; uv.v = v[i];
         Vec3 o = vec3(0.0f, 0.0f, 0.0f);
-        LightSample s = sample_triangle_light(&params, &e, o, o, uv, choice[i]);
+        LightSample s = sample_triangle_light(&params, 0, &e, o, o, uv, choice[i]);
         x[i] = s.direction.x; y[i] = s.direction.y; z[i] = s.direction.z; d[i] = s.distance;
         r[i] = s.radiance.x; g[i] = s.radiance.y; b[i] = s.radiance.z; pdf[i] = s.pdf;"""
     results = _light_call(
@@ -242,8 +242,8 @@ def _tables(device: Device, scene: Scene) -> SceneTables:
 
 
 def _planes(tables: SceneTables) -> npt.NDArray[np.float32]:
-    """(len(LightPlane), N) as they are on the device."""
-    planes = np.zeros((len(layout.LightPlane), tables.light_count), np.float32)
+    """(LightPlane.TEXTURE, N) as they are on the device."""
+    planes = np.zeros((layout.LightPlane.TEXTURE, tables.light_count), np.float32)
     return tables.pool.device.read(tables.buffer("lights"), planes) if planes.size else planes
 
 

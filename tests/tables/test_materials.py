@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from support.parameters import NAMES, unlike_default
+from support.parameters import NAMES, TEXTURES, unlike_default
 
 from incpt.core import layout
 from incpt.core.layout import MaterialFlag
 from incpt.device.device import Device
 from incpt.scene.material import Material
 from incpt.tables.materials import MaterialTables, material_tables
+from incpt.tables.textures import texture_tables
 
 IN_FLAGS = {"double_sided": MaterialFlag.DOUBLE_SIDED, "transmission": MaterialFlag.TRANSMISSIVE}
 """Parameters that set a flag, `transmission` beside its own field."""
@@ -21,7 +22,7 @@ IN_FLAGS = {"double_sided": MaterialFlag.DOUBLE_SIDED, "transmission": MaterialF
 
 def tables(device: Device, *materials: Material) -> MaterialTables:
     named = {f"material {i}": material for i, material in enumerate(materials)}
-    return material_tables(device, named, {"material 1": 0.5})
+    return material_tables(device, named, {"material 1": 0.5}, texture_tables(device, named))
 
 
 def row(device: Device, made: MaterialTables, index: int) -> dict[str, Any]:
@@ -43,6 +44,10 @@ def test_a_parameter_reaches_its_field_of_the_table_and_no_other(device: Device,
     made = tables(device, Material(), Material(), Material(**{name: value}))
     default, other = row(device, made, 0), row(device, made, 2)
     changed = {key for key in default if not np.array_equal(default[key], other[key])}
+    if name in TEXTURES:
+        assert changed == {"textures"}
+        assert other["textures"].tolist() == [int(name == slot) for slot in TEXTURES]
+        return
     assert changed == {name} & set(default) | ({"flags"} if name in IN_FLAGS else set())
     if name in default:
         np.testing.assert_array_equal(other[name], np.asarray(value, default[name].dtype))
@@ -66,7 +71,7 @@ def test_layers_follow_what_their_albedo_depends_on(device: Device) -> None:
 
 
 def test_there_is_a_row_without_any_material(device: Device) -> None:
-    made = material_tables(device, {}, {})
+    made = material_tables(device, {}, {}, texture_tables(device, {}))
     assert made.buffers["materials"].size == layout.MATERIAL.itemsize
     assert made.is_matte and not made.has_media
 

@@ -139,7 +139,9 @@ def test_memory_is_given_back(device: Device) -> None:
 def test_what_kernels_cannot_address_is_an_error(device: Device) -> None:
     buffer = buffer_of(device, most=100)
     kept = buffer.add([words(60)])
-    with pytest.raises(DeviceError, match=r"meshes need 101 words, and kernels can address 100; use smaller"):
+    with pytest.raises(
+        DeviceError, match=r"the scene needs 101 words, and kernels can address 100; use smaller"
+    ):
         buffer.add([words(41)])
     kept += buffer.add([words(40, 60)])
     assert buffer.capacity == 100

@@ -119,7 +119,7 @@ def contents(tables: SceneTables) -> dict[str, npt.NDArray[np.uint8]]:
     """Buffers, byte for byte, but those of meshes."""
     found = {name: read(tables, name) for name in NAMES}
     if tables.light_count:  # in whatever order: no object refers to them
-        planes = read(tables, "lights").view(np.float32).reshape(len(LightPlane), -1)
+        planes = read(tables, "lights").view(np.float32).reshape(LightPlane.TEXTURE, -1)
         planes = planes[: LightPlane.ALIAS_PROBABILITY]
         found["lights"] = np.ascontiguousarray(planes[:, np.lexsort(planes)]).view(np.uint8)
     return found

@@ -6,10 +6,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from incpt.formats import insert, registry
+from incpt.core.layout import TextureSlot
+from incpt.formats import bitmaps, insert, registry
+from incpt.formats.bitmaps import load_bitmap
 from incpt.formats.registry import FileKind
+from incpt.scene.material import texture_name
 from incpt.scene.selection import Selection
+from incpt.scene.texture import Texture
 from incpt.ui.dialogs.native import FileFilter
 from incpt.ui.dialogs.path_dialog import PathDialog
 from incpt.ui.dialogs.question import Choice, Question
@@ -24,6 +29,8 @@ MESH_FILES = FileFilter("Meshes", registry.suffixes(FileKind.MESH))
 """Files that hold a mesh."""
 ENVIRONMENTS = FileFilter("Environments", registry.suffixes(FileKind.IMAGE))
 """Images that may surround the scene."""
+TEXTURES = FileFilter("Images", bitmaps.SUFFIXES)
+"""Images that may lie on surfaces."""
 
 
 def new(editor: Editor) -> None:
@@ -82,6 +89,19 @@ def choose_environment(editor: Editor) -> None:
         editor.propose(insert.set_environment_image(editor.scene, path), "Environment image")
 
     ask_path(editor, "Environment image", ENVIRONMENTS, False, use)
+
+
+def choose_texture(editor: Editor, material: str, slot: TextureSlot) -> None:
+    """Ask for an image and put it into a slot of a material. An emission that is black becomes white, else
+    the image would not be seen."""
+
+    def use(path: Path) -> None:
+        values: dict[str, Any] = {texture_name(slot): Texture(load_bitmap(path))}
+        if slot is TextureSlot.EMISSION and not editor.scene.materials[material].is_emissive:
+            values["emission"] = (1.0, 1.0, 1.0)
+        editor.propose(editor.scene.with_material(material, **values), "Texture")
+
+    ask_path(editor, "Texture", TEXTURES, False, use)
 
 
 def drop(editor: Editor, path: Path) -> None:

@@ -4,18 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 
+import numpy as np
 import pytest
+from support.parameters import A_TEXTURE, TEXTURES
 from support.small_scenes import mixed_scene
 from support.ui_harness import Desk, changes, desk, places, state
 
+from incpt.core.layout import TextureSlot
+from incpt.formats import bitmaps
 from incpt.scene.material import Material
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
+from incpt.ui.commands import files
+from incpt.ui.dialogs.path_dialog import PathDialog
+from incpt.ui.panels import textures
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
 from incpt.viewer.renderer import Pin, Restart
 
-SCENE = mixed_scene(size=(48, 32), strategy="spiral")
+SCENE = mixed_scene(size=(48, 32), strategy="spiral").with_material("red", normal_texture=A_TEXTURE)
 PREFERENCES = Preferences(
     display=DisplaySettings(overlay="spp"), snap=SnapSettings(enabled=True), navigation="blender"
 )
@@ -68,6 +76,7 @@ FIELDS = [
     Field("Object", "Transmission", "scene.materials.glass.transmission", "0.5", 0.5, BALL, -30),
     *vector("Object", "Absorption", "scene.materials.glass.absorption", BALL, "RGB"),
     Field("Object", "Priority", "scene.materials.glass.priority", "7", 7, BALL, 60),
+    Field("Object", "Normal strength", "scene.materials.red.normal_scale", "0.5", 0.5),
     *vector("Scene", "Camera", "scene.camera.position"),
     *vector("Scene", "Target", "scene.camera.target"),
     Field("Scene", "Field of view", "scene.camera.fov_y", "60", 60),
@@ -119,18 +128,22 @@ BUTTONS = [
     ("Object", "Scale", {f"scene.objects.floor.scale.{i}" for i in (0, 2)}),
     ("Object", "Rename…##material", {"dialog"}),
     ("Object", "Delete##material", {"notices"}),
+    *(("Object", f"Choose…##{name}", {"dialog"}) for name in TEXTURES),
     ("Scene", "Remove##image", {"scene.environment.image"}),
     ("Scene", "Choose…##image", {"dialog"}),
     ("Render", "Pause", {"control.paused"}),
     ("Render", "Restart", set()),
 ]
 
-SECTIONS = {"Transform", "Gizmo", "Material", "Transmission", "Emission", "Camera", "Environment"}
+SECTIONS = {"Transform", "Gizmo", "Material", "Textures", "Transmission", "Emission", "Camera", "Environment"}
 SECTIONS |= {"Settings of the scene", "Display", "Measurements"}
 SHOWN_ONLY = {"Image", "Step time plot", "Device"}
+SHOWN_ONLY |= {f"   {label}" for label, _ in textures._LABELS.values()}
+NOT_AT_FIRST = {f"Remove##{name}" for name in TEXTURES if name != "normal_texture"}
+"""Buttons that have nothing to do."""
 ELSEWHERE = {
     "Name", "Uniform scale", "Emission colour", "Emission strength", "New##material", "Duplicate##material",
-    "Frame selected##camera", "Reset##camera", "Pin this picture",
+    "Frame selected##camera", "Reset##camera", "Pin this picture", "Remove##normal_texture",
 }  # fmt: skip
 """Tested below, one by one."""
 
@@ -139,7 +152,9 @@ def test_every_parameter_of_a_material_has_a_row() -> None:
     used = [field.place for field in FIELDS] + [place for _, _, place in CHECKBOXES]
     material = {place.split(".")[3] for place in used if place.startswith("scene.materials.")}
     # Emission has two widgets of its own, tested below.
-    assert material | {"emission"} == {field.name for field in fields(Material)}
+    assert material | {"emission", *TEXTURES} == {field.name for field in fields(Material)}
+    buttons = {label.partition("##")[2] for _, label, _ in BUTTONS}
+    assert buttons >= set(TEXTURES)
     assert "emission" not in material and {"Emission colour", "Emission strength"} <= ELSEWHERE
 
 
@@ -351,11 +366,32 @@ def test_every_widget_of_the_panels_is_tested(user: Desk) -> None:
             if not name.startswith(("menu ", "object ", "visible "))
             and name not in ("Search", "status", "picture", "gizmo")
         }
-    assert shown - tested - SECTIONS - SHOWN_ONLY == ELSEWHERE
+    assert shown - tested - SECTIONS - SHOWN_ONLY - NOT_AT_FIRST == ELSEWHERE
     assert tested - shown == set()
 
 
 # --------------------------------------------------------------------------------- what is special in some
+
+
+def test_a_texture_is_taken_away(user: Desk) -> None:
+    turn_to(user, "Object")
+    scene = user.scene
+    user.click("Remove##normal_texture")
+    assert user.scene == scene.with_material("red", normal_texture=None)
+    assert_one_edit(user, scene)
+
+
+def test_an_image_is_chosen_for_a_texture(user: Desk, tmp_path: Path) -> None:
+    """An emission that is black would hide it."""
+    bitmaps.write_bitmap(tmp_path / "sign.png", A_TEXTURE.bitmap)
+    files.choose_texture(user.editor, "red", TextureSlot.EMISSION)
+    dialog = user.editor.dialog
+    assert isinstance(dialog, PathDialog)
+    dialog.then(tmp_path / "sign.png")
+    user.frames(2)
+    red = user.scene.materials["red"]
+    assert red.emission_texture is not None and red.emission == (1, 1, 1)
+    np.testing.assert_array_equal(red.emission_texture.bitmap.pixels, A_TEXTURE.bitmap.pixels)
 
 
 @pytest.mark.parametrize("strategy", ["restart", "impact"])
