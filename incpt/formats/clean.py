@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core.errors import InputError
+from incpt.formats.vertex_attributes import NO_ATTRIBUTES, VertexAttributes
 from incpt.scene.checks import LARGEST
 from incpt.scene.mesh import Mesh
 
@@ -18,12 +19,14 @@ def usable_mesh(
     faces: npt.NDArray[np.int64],
     normals: npt.NDArray[np.float64] | None,
     counts: dict[str, int],
+    attributes: VertexAttributes = NO_ATTRIBUTES,
 ) -> Mesh | None:
     """A mesh of the faces that can be rendered, or None if there is none.
 
     `vertices` (V, 3), `faces` (F, 3) and `normals` (V, 3) at the vertices, of any length, or None for flat
-    faces, may hold whatever a damaged file does. `counts` gets, by the words of a message, how many faces
-    were left out, and under "in all" how many there were. Raises InputError: arrays of other shapes.
+    faces, and `attributes` may hold whatever a damaged file does. `counts` gets, by the words of a message,
+    how many faces were left out, and under "in all" how many there were. Raises InputError: arrays of other
+    shapes.
     """
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
         raise InputError("has vertices without three coordinates; the file is damaged")
@@ -37,7 +40,7 @@ def usable_mesh(
     stored = np.where(finite[:, None], stored, np.float32(0))
     faces = faces[usable]
     corner_normals = None if normals is None else _corner_normals(stored, faces, normals)
-    return Mesh(stored, faces.astype(np.int32), corner_normals)
+    return Mesh(stored, faces.astype(np.int32), corner_normals, **attributes.at_corners(faces))
 
 
 def _usable_faces(

@@ -1,4 +1,5 @@
-"""glTF: what must be refused before trimesh reads the file, and materials, which trimesh leaves out."""
+"""glTF: what must be refused before trimesh reads the file, and what trimesh leaves out: materials with their
+textures, texture coordinates, colours, tangents."""
 
 from __future__ import annotations
 
@@ -9,10 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from incpt.core.errors import InputError, reason_of
 from incpt.core.files import check_readable, read_bytes
+from incpt.formats.gltf_data import GltfData
+from incpt.formats.vertex_attributes import VertexAttributes
 from incpt.scene.material import Material
+from incpt.scene.texture import UV_SETS, Texture
 
 MAX_UNSTORED_ITEMS = 100_000_000
 """The most values that an accessor without data may claim. trimesh allocates zeros for them, and the count of
@@ -77,45 +82,90 @@ def _check_primitive(primitive: dict[str, Any], accessors: list[dict[str, Any]])
         raise InputError("has quantised positions, which cannot be read; export them as floats")
 
 
-def gltf_materials(
-    header: dict[str, Any], geometries: list[str]
-) -> dict[str, tuple[str | None, Material | None]]:
+def gltf_attributes(data: GltfData, geometries: list[str]) -> dict[str, VertexAttributes]:
+    """Texture coordinates, colours and tangents by name of trimesh's geometry; see `gltf_materials`."""
+    found = {}
+    for name, primitive in _matched(data, geometries).items():
+        accessors = primitive.get("attributes", {})
+
+        def values(attribute: str, accessors: dict[str, int] = accessors) -> npt.NDArray[np.float64] | None:
+            return data.values(accessors[attribute]) if attribute in accessors else None
+
+        sets = [values(f"TEXCOORD_{number}") for number in range(UV_SETS)]
+        # The second set without a first one stays the second.
+        uvs = [one for one in sets if one is not None] if sets[0] is not None else []
+        if sets[0] is None and sets[1] is not None:
+            uvs = [np.zeros_like(sets[1]), sets[1]]
+        colors = values("COLOR_0")
+        if colors is not None and colors.shape[1] == 3:
+            colors = np.column_stack([colors, np.ones(len(colors))])
+        found[name] = VertexAttributes(tuple(uvs), colors, values("TANGENT"))
+    return found
+
+
+def gltf_materials(data: GltfData, geometries: list[str]) -> dict[str, tuple[str | None, Material | None]]:
     """Name and material by name of trimesh's geometry; empty where the two cannot be matched.
 
-    `header` is what `gltf_header` returns. trimesh makes a geometry of every primitive, in the file's order,
-    which are `geometries` here.
+    trimesh makes a geometry of every primitive, in the file's order, which are `geometries` here.
     """
-    primitives = [
-        primitive
-        for mesh in header.get("meshes", [])
-        for primitive in mesh["primitives"]
-        if primitive.get("mode", 4) in _GLTF_LINES_POINTS_TRIANGLES_STRIPS
-    ]
-    if len(primitives) != len(geometries):
-        return {}
     result: dict[str, tuple[str | None, Material | None]] = {}
-    for name, primitive in zip(geometries, primitives, strict=True):
+    made: dict[int, tuple[str, Material]] = {}
+    for name, primitive in _matched(data, geometries).items():
         try:
             index = primitive["material"]
-            table = header["materials"][index]
-            result[name] = (str(table.get("name") or f"material {index}"), _gltf_material(table))
-        except (KeyError, IndexError, TypeError, ValueError, AttributeError):
+            if index not in made:
+                table = data.header["materials"][index]
+                made[index] = str(table.get("name") or f"material {index}"), _gltf_material(table, data)
+            result[name] = made[index]
+        except InputError:
+            raise
+        except (KeyError, IndexError, TypeError, ValueError, AttributeError, StopIteration):
             continue  # The default material is used in place of one that is missing or out of range.
     return result
 
 
-def _gltf_material(table: dict[str, Any]) -> Material:
-    """Factors of a glTF 2.0 material and of its KHR extensions ior, specular, transmission, volume and
-    emissive_strength; textures are left out."""
+def embedded_image(path: Path, index: int) -> tuple[bytes, str]:
+    """The content of an image of a glTF file, by number, and the suffix of such files. Raises InputError."""
+    suffix = path.suffix[1:].lower()
+    if suffix not in ("glb", "gltf"):
+        raise InputError("has no images by number; leave `image` out")
+    data = GltfData(path, gltf_header(path, suffix))
+    count = len(data.header.get("images", []))
+    if index >= count:
+        raise InputError(f"image: {index} is not in the file, which has {count}")
+    try:
+        return data.image(index)
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(f"image {index}: cannot be read ({reason_of(error)})") from None
+
+
+def _matched(data: GltfData, geometries: list[str]) -> dict[str, dict[str, Any]]:
+    """Primitives by the name of trimesh's geometry; empty where the two cannot be matched."""
+    primitives = [
+        primitive
+        for mesh in data.header.get("meshes", [])
+        for primitive in mesh["primitives"]
+        if primitive.get("mode", 4) in _GLTF_LINES_POINTS_TRIANGLES_STRIPS
+    ]
+    return dict(zip(geometries, primitives, strict=True)) if len(primitives) == len(geometries) else {}
+
+
+def _gltf_material(table: dict[str, Any], data: GltfData) -> Material:
+    """A glTF 2.0 material, and what its KHR extensions ior, specular, transmission, volume and
+    emissive_strength say."""
     surface = table.get("pbrMetallicRoughness", {})
     extensions = table.get("extensions", {})
 
     def factor(extension: str, key: str, default: Any) -> Any:
         return extensions.get(f"KHR_materials_{extension}", {}).get(key, default)
 
+    def texture(of: dict[str, Any] | None) -> Texture | None:
+        return None if of is None else data.texture(of)
+
     strength = factor("emissive_strength", "emissiveStrength", 1.0)
     distance = factor("volume", "attenuationDistance", np.inf)
     attenuation = np.clip(factor("volume", "attenuationColor", [1.0, 1.0, 1.0]), 1e-6, 1.0)
+    normal = table.get("normalTexture", {})
     return Material(
         base_color=tuple(surface.get("baseColorFactor", [1.0, 1.0, 1.0])[:3]),
         metallic=surface.get("metallicFactor", 1.0),
@@ -126,4 +176,11 @@ def _gltf_material(table: dict[str, Any]) -> Material:
         absorption=tuple((-np.log(attenuation) / distance).tolist()),
         emission=tuple(float(e) * strength for e in table.get("emissiveFactor", [0.0, 0.0, 0.0])),
         double_sided=table.get("doubleSided", False),
+        normal_scale=normal.get("scale", 1.0),
+        base_color_texture=texture(surface.get("baseColorTexture")),
+        metallic_roughness_texture=texture(surface.get("metallicRoughnessTexture")),
+        normal_texture=texture(table.get("normalTexture")),
+        emission_texture=texture(table.get("emissiveTexture")),
+        transmission_texture=texture(factor("transmission", "transmissionTexture", None)),
+        specular_texture=texture(factor("specular", "specularTexture", None)),
     )

@@ -25,10 +25,16 @@ import trimesh
 from incpt.core.errors import InputError, InputWarning, reason_of
 from incpt.core.files import read_bytes
 from incpt.formats.clean import usable_mesh
-from incpt.formats.gltf import gltf_header, gltf_materials
+from incpt.formats.gltf import gltf_attributes, gltf_header, gltf_materials
+from incpt.formats.gltf_data import GltfData
 from incpt.formats.obj import ODD_FACE, absolute_obj, utf8
+from incpt.formats.vertex_attributes import VertexAttributes
+from incpt.picture.color import linear_from_srgb
 from incpt.scene.mesh import MeshSource
 from incpt.scene.mesh_part import MeshPart
+
+_UV_UPWARDS = ("obj", "ply", "dae")
+"""Files whose texture coordinates are (0, 0) at the bottom left of an image."""
 
 
 def read_with_trimesh(path: Path) -> tuple[MeshPart, ...]:
@@ -40,13 +46,16 @@ def read_with_trimesh(path: Path) -> tuple[MeshPart, ...]:
     loaded, dropped = _load_obj(path) if suffix == "obj" else (_load(path, suffix), 0)
     counts = {"in all": dropped, "with an index out of range": dropped}
     instances = _instances(loaded)
-    materials = gltf_materials(header, list(loaded.geometry))
+    data = GltfData(path, header)
+    materials = gltf_materials(data, list(loaded.geometry))
+    from_header = gltf_attributes(data, list(loaded.geometry))
     parts = []
     for name, geometry_name, matrix in instances:
         geometry = loaded.geometry[geometry_name]
         # STL has a normal for each face, of which trimesh makes normals at vertices.
         normals = None if suffix == "stl" else _normals(geometry)
-        mesh = usable_mesh(*_placed(geometry, normals, matrix), counts)
+        attributes = from_header.get(geometry_name) or _attributes(geometry, suffix)
+        mesh = usable_mesh(*_placed(geometry, normals, matrix), counts, attributes.placed(matrix[:3, :3]))
         if mesh is not None:
             parts.append(MeshPart(name, mesh, *materials.get(geometry_name, (None, None))))
     left_out = ", ".join(
@@ -77,6 +86,24 @@ def _normals(geometry: trimesh.Trimesh) -> npt.NDArray[np.float64] | None:
         return None
     normals = np.asarray(geometry.vertex_normals, np.float64)
     return normals if normals.shape == np.shape(geometry.vertices) else None
+
+
+def _attributes(geometry: trimesh.Trimesh, suffix: str) -> VertexAttributes:
+    """Texture coordinates and colours as trimesh has read them."""
+    visual: Any = geometry.visual
+    count = len(geometry.vertices)
+    uv = getattr(visual, "uv", None)
+    colors = getattr(visual, "vertex_colors", None) if visual.kind == "vertex" else None
+    uvs = np.zeros((0, 2)) if uv is None else np.asarray(uv, np.float64)
+    found = VertexAttributes()
+    if len(uvs) == count and uvs.ndim == 2 and uvs.shape[1] >= 2 and suffix in _UV_UPWARDS:
+        found = replace(found, uvs=(uvs[:, :2] * [1, -1] + [0, 1],))
+    if colors is not None and np.shape(colors) == (count, 4):
+        # These files have bytes, as displays show them.
+        shown = np.asarray(colors, np.float64) / 255
+        linear = np.concatenate([linear_from_srgb(shown[:, :3]), shown[:, 3:]], axis=1)
+        found = replace(found, colors=linear)
+    return found
 
 
 def _placed(

@@ -1,0 +1,55 @@
+"""What mesh files have at vertices beside positions and normals: texture coordinates, colours, tangents."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from incpt.scene.checks import LARGEST
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class VertexAttributes:
+    """For V vertices, as the file has them: up to two sets of texture coordinates (V, 2), (0, 0) at the top
+    left of an image; linear colours (V, 4); tangents with the side of v (V, 4)."""
+
+    uvs: tuple[Array, ...] = ()
+    colors: Array | None = None
+    tangents: Array | None = None
+
+    def placed(self, linear: Array) -> VertexAttributes:
+        """Under a (3, 3) matrix."""
+        if self.tangents is None:
+            return self
+        along = self.tangents[:, :3] @ linear.T
+        side = self.tangents[:, 3:] * np.sign(np.linalg.det(linear))
+        return replace(self, tangents=np.concatenate([along, side], axis=1))
+
+    def at_corners(self, faces: npt.NDArray[np.int64]) -> dict[str, Any]:
+        """The keywords of a Mesh for faces (F, 3). Numbers that are not finite become 0."""
+        keywords: dict[str, Any] = {"uvs": tuple(_within(uv, LARGEST)[faces] for uv in self.uvs)}
+        if self.colors is not None:
+            keywords["colors"] = np.clip(_within(self.colors, LARGEST), 0, 1)[faces]
+        if self.tangents is not None:
+            keywords["tangents"] = _unit_tangents(self.tangents)[faces]
+        return keywords
+
+
+NO_ATTRIBUTES = VertexAttributes()
+
+
+def _within(values: Array, largest: float) -> Array:
+    return np.clip(np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0), -largest, largest)
+
+
+def _unit_tangents(tangents: Array) -> Array:
+    finite = _within(tangents, LARGEST)
+    length = np.linalg.norm(finite[:, :3], axis=1, keepdims=True)
+    usable = length > 1e-12
+    along = np.where(usable, finite[:, :3] / np.where(usable, length, 1), [1.0, 0.0, 0.0])
+    return np.concatenate([along, np.where(finite[:, 3:] < 0, -1.0, 1.0)], axis=1)

@@ -1,0 +1,239 @@
+"""glTF: textures, and what meshes have at their corners, number by number."""
+
+from __future__ import annotations
+
+import base64
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from incpt.core.errors import InputError
+from incpt.formats import bitmaps, mesh_files, scene_save
+from incpt.formats.mesh_scene import scene_around
+from incpt.formats.registry import load
+from incpt.scene.mesh_part import MeshPart
+from incpt.scene.texture import Bitmap
+
+POSITIONS = np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+FACES = np.uint16([[0, 1, 2], [0, 2, 3]])
+UVS = np.float32([[0, 1], [1, 1], [1, 0], [0, 0]])
+PIXELS = np.arange(36, dtype=np.uint8).reshape(3, 4, 3) * 7
+
+_TYPES = {"float32": 5126, "uint16": 5123, "uint8": 5121, "int8": 5120, "int16": 5122, "uint32": 5125}
+_SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+
+
+class Writer:
+    """Makes a small glTF file."""
+
+    def __init__(self) -> None:
+        self.content = b""
+        self.views: list[dict[str, Any]] = []
+        self.accessors: list[dict[str, Any]] = []
+        self.more: dict[str, Any] = {}
+
+    def view(self, content: bytes, **more: Any) -> int:
+        self.content += bytes(-len(self.content) % 4)
+        self.views.append({"buffer": 0, "byteOffset": len(self.content), "byteLength": len(content), **more})
+        self.content += content
+        return len(self.views) - 1
+
+    def accessor(self, values: npt.NDArray[Any], **more: Any) -> int:
+        values = values.reshape(len(values), -1) if values.ndim > 1 else values[:, None]
+        view = self.view(values.tobytes())
+        kind = {"componentType": _TYPES[values.dtype.name], "type": _SHAPES[values.shape[1]]}
+        bounds = {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
+        self.accessors.append({"bufferView": view, "count": len(values), **kind, **bounds, **more})
+        return len(self.accessors) - 1
+
+    def document(self, attributes: dict[str, int], material: dict[str, Any]) -> dict[str, Any]:
+        primitive = {
+            "attributes": {"POSITION": self.accessor(POSITIONS), **attributes},
+            "indices": self.accessor(FACES.ravel()),
+            "material": 0,
+        }
+        return {
+            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+            "nodes": [{"mesh": 0, **self.more.pop("node", {})}], "meshes": [{"primitives": [primitive]}],
+            "materials": [material], "accessors": self.accessors, "bufferViews": self.views,
+            "buffers": [{"byteLength": len(self.content)}], **self.more,
+        }  # fmt: skip
+
+    def write_gltf(self, path: Path, attributes: dict[str, int], material: dict[str, Any]) -> Path:
+        document = self.document(attributes, material)
+        text = base64.b64encode(self.content).decode()
+        document["buffers"] = [
+            {"byteLength": len(self.content), "uri": f"data:application/octet-stream;base64,{text}"}
+        ]
+        path.write_text(json.dumps(document))
+        return path
+
+    def write_glb(self, path: Path, attributes: dict[str, int], material: dict[str, Any]) -> Path:
+        text = json.dumps(self.document(attributes, material)).encode()
+        text += b" " * (-len(text) % 4)
+        body = self.content + bytes(-len(self.content) % 4)
+        chunks = [(text, b"JSON"), (body, b"BIN\0")]
+        joined = b"".join(len(c).to_bytes(4, "little") + kind + c for c, kind in chunks)
+        path.write_bytes(
+            b"glTF" + (2).to_bytes(4, "little") + (12 + len(joined)).to_bytes(4, "little") + joined
+        )
+        return path
+
+
+def png(folder: Path) -> bytes:
+    bitmaps.write_bitmap(folder / "made.png", Bitmap(PIXELS))
+    return (folder / "made.png").read_bytes()
+
+
+def only_part(path: Path) -> MeshPart:
+    (part,) = mesh_files.load_parts(path)
+    assert part.material is not None
+    return part
+
+
+def test_images_of_each_kind_are_read(tmp_path: Path) -> None:
+    content = png(tmp_path)
+    (tmp_path / "with space.png").write_bytes(content)
+    for kind in ("file", "data", "view"):
+        for suffix in ("gltf", "glb"):
+            writer = Writer()
+            image = {
+                "file": {"uri": "with%20space.png"},
+                "data": {"uri": "data:image/png;base64," + base64.b64encode(content).decode()},
+                "view": {"bufferView": 0, "mimeType": "image/png"},
+            }[kind]
+            writer.view(content)
+            writer.more = {"images": [image], "textures": [{"source": 0}]}
+            material = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
+            write = writer.write_gltf if suffix == "gltf" else writer.write_glb
+            path = write(tmp_path / f"{kind}.{suffix}", {"TEXCOORD_0": writer.accessor(UVS)}, material)
+            part = only_part(path)
+            assert part.material is not None
+            texture = part.material.base_color_texture
+            assert texture is not None
+            np.testing.assert_array_equal(texture.bitmap.pixels, PIXELS)
+            np.testing.assert_array_equal(part.mesh.uvs[0], UVS[FACES])
+            # And by way of a scene file.
+            scene = scene_around(path)
+            scene_save.save(scene, tmp_path / "saved.toml")
+            again = load(tmp_path / "saved.toml")
+            stored = next(iter(again.materials.values())).base_color_texture
+            assert stored is not None
+            np.testing.assert_array_equal(stored.bitmap.pixels, PIXELS)
+            assert not list(tmp_path.glob("saved.*.png")), "the image is in the file already"
+
+
+def test_all_slots_and_how_they_are_read(tmp_path: Path) -> None:
+    (tmp_path / "made.png").write_bytes(png(tmp_path))
+    writer = Writer()
+    writer.more = {
+        "images": [{"uri": "made.png"}],
+        "samplers": [{"wrapS": 33071, "wrapT": 33648, "magFilter": 9728}, {"magFilter": 9729}],
+        "textures": [{"source": 0, "sampler": 0}, {"source": 0, "sampler": 1}, {"source": 0}],
+    }
+    transform = {"offset": [0.1, 0.2], "rotation": np.pi / 4, "scale": [2, 3], "texCoord": 1}
+    material = {
+        "name": "all",
+        "pbrMetallicRoughness": {
+            "baseColorTexture": {"index": 0, "extensions": {"KHR_texture_transform": transform}},
+            "metallicRoughnessTexture": {"index": 1, "texCoord": 1},
+        },
+        "normalTexture": {"index": 2, "scale": 0.5},
+        "emissiveTexture": {"index": 2},
+        "emissiveFactor": [1, 0.5, 0.25],
+        "extensions": {
+            "KHR_materials_transmission": {"transmissionFactor": 0.5, "transmissionTexture": {"index": 2}},
+            "KHR_materials_specular": {"specularTexture": {"index": 1}},
+        },
+    }
+    uvs = writer.accessor((UVS * 65535).astype(np.uint16), normalized=True)
+    colors = np.uint8([[255, 0, 51, 255]] * 4)
+    tangents = np.float32([[1, 0, 0, -1]] * 4)
+    attributes = {
+        "TEXCOORD_0": writer.accessor(UVS), "TEXCOORD_1": uvs, "COLOR_0": writer.accessor(colors,
+        normalized=True), "TANGENT": writer.accessor(tangents), "NORMAL": writer.accessor(np.float32([[0, 0,
+        1]] * 4)),
+    }  # fmt: skip
+    part = only_part(writer.write_gltf(tmp_path / "all.gltf", attributes, material))
+    made, mesh = part.material, part.mesh
+    assert made is not None and made.normal_scale == 0.5
+    base, rough, normal = made.base_color_texture, made.metallic_roughness_texture, made.normal_texture
+    assert base is not None and rough is not None and normal is not None
+    assert (base.wrap, base.filter, base.uv_set) == (("clamp", "mirror"), "nearest", 1)
+    assert (base.offset, base.scale) == ((0.1, 0.2), (2, 3)) and base.rotation == pytest.approx(45)
+    assert (rough.wrap, rough.filter, rough.uv_set) == (("repeat", "repeat"), "bilinear", 1)
+    assert (normal.uv_set, normal.filter) == (0, "bilinear")
+    assert made.emission_texture == normal and made.transmission_texture == normal
+    assert made.specular_texture is not None and made.specular_texture.bitmap is base.bitmap
+    np.testing.assert_allclose(mesh.uvs[1], UVS[FACES], atol=1e-5)
+    assert mesh.colors is not None and mesh.tangents is not None
+    np.testing.assert_allclose(mesh.colors, np.broadcast_to([1, 0, 0.2, 1], (2, 3, 4)), atol=1e-6)
+    np.testing.assert_array_equal(mesh.tangents, np.broadcast_to([1, 0, 0, -1], (2, 3, 4)))
+
+
+def test_placements_turn_tangents_too(tmp_path: Path) -> None:
+    """A quarter turn about z, mirrored in y: the side of v changes."""
+    for scale, side in (([1, 1, 1], 1), ([1, -1, 1], -1)):
+        writer = Writer()
+        writer.more = {"node": {"rotation": [0, 0, 2**-0.5, 2**-0.5], "scale": scale}}
+        attributes = {
+            "TEXCOORD_0": writer.accessor(UVS), "NORMAL": writer.accessor(np.float32([[0, 0, 1]] * 4)),
+            "TANGENT": writer.accessor(np.float32([[1, 0, 0, 1]] * 4)),
+        }  # fmt: skip
+        mesh = only_part(writer.write_gltf(tmp_path / f"{side}.gltf", attributes, {})).mesh
+        assert mesh.tangents is not None
+        np.testing.assert_allclose(mesh.tangents, np.broadcast_to([0, 1, 0, side], (2, 3, 4)), atol=1e-6)
+
+
+def test_what_is_wrong_with_an_image_is_one_line(tmp_path: Path) -> None:
+    content = png(tmp_path)
+    for name, image, words in (
+        ("missing", {"uri": "nowhere.png"}, "nowhere.png: no such file"),
+        (
+            "damaged",
+            {"uri": "data:image/png;base64," + base64.b64encode(content[:40]).decode()},
+            "image 0: is",
+        ),
+        ("odd", {"uri": "data:image/png;base64,###"}, "image 0: "),
+    ):
+        writer = Writer()
+        writer.more = {"images": [image], "textures": [{"source": 0}]}
+        material = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
+        path = writer.write_gltf(tmp_path / f"{name}.gltf", {"TEXCOORD_0": writer.accessor(UVS)}, material)
+        with pytest.raises(InputError, match=rf"^[^\n]*{name}.gltf: [^\n]*{words}[^\n]*$"):
+            mesh_files.load_parts(path)
+
+
+def test_a_damaged_accessor_is_one_line(tmp_path: Path) -> None:
+    writer = Writer()
+    uvs = writer.accessor(UVS)
+    writer.accessors[uvs]["count"] = 4_000_000
+    path = writer.write_gltf(tmp_path / "a.gltf", {"TEXCOORD_0": uvs}, {})
+    with pytest.raises(InputError, match=r"^[^\n]*a.gltf: [^\n]*$"):
+        mesh_files.load_parts(path)
+
+
+def test_obj_has_texture_coordinates(tmp_path: Path) -> None:
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 0.75\nf 1/1 2/2 3/3\n")
+    (part,) = mesh_files.load_parts(path)
+    np.testing.assert_allclose(part.mesh.uvs[0], [[[0, 1], [1, 1], [0, 0.25]]], atol=1e-6)
+
+
+def test_colours_of_ply_are_linear(tmp_path: Path) -> None:
+    lines = ["ply", "format ascii 1.0", "element vertex 3"]
+    lines += [f"property float {axis}" for axis in "xyz"] + [
+        f"property uchar {c}" for c in ("red", "green", "blue")
+    ]
+    lines += ["element face 1", "property list uchar int vertex_indices", "end_header"]
+    path = tmp_path / "a.ply"
+    path.write_text(
+        "\n".join([*lines, "0 0 0 255 0 128", "1 0 0 255 0 128", "0 1 0 255 0 128", "3 0 1 2", ""])
+    )
+    (part,) = mesh_files.load_parts(path)
+    assert part.mesh.colors is not None
+    np.testing.assert_allclose(part.mesh.colors[0, 0], [1, 0, 0.21586, 1], atol=1e-4)
