@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +10,18 @@ import mitsuba as mi
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core.layout import MIN_ALPHA
+from incpt.core.layout import MIN_ALPHA, TextureSlot
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
-from incpt.scene.material import Material
+from incpt.scene.material import Material, texture_of
 from incpt.scene.model import Object, Scene
+from incpt.scene.texture import Bitmap, Texture
+from incpt.tables.texels import linear_colors
+
+_COUNTERPARTS = (
+    TextureSlot.BASE_COLOR, TextureSlot.METALLIC_ROUGHNESS, TextureSlot.EMISSION, TextureSlot.NORMAL,
+)  # fmt: skip
+"""Slots of which something has a counterpart."""
 
 
 def scene_dict(
@@ -40,8 +48,28 @@ def scene_dict(
 
 def bsdf(material: Material) -> dict[str, Any]:
     """What of our materials has an exact counterpart; raises ValueError for anything else."""
-    alpha = max(material.roughness**2, MIN_ALPHA)
-    white = material.base_color == (1, 1, 1)
+    if material.normal_texture is not None and material.normal_scale == 1:
+        plain = bsdf(replace(material, normal_texture=None))
+        nested = plain["bsdf"] if plain["type"] == "twosided" else plain
+        shading = {"use_shadowing_function": False, "bsdf": nested}
+        mapped = {
+            "type": "normalmap",
+            "normalmap": bitmap(material.normal_texture, is_color=False),
+            **shading,
+        }
+        return {**plain, "bsdf": mapped} if plain["type"] == "twosided" else mapped
+    used = [texture_of(material, slot) for slot in TextureSlot if slot not in _COUNTERPARTS]
+    if any(texture is not None for texture in used) or material.normal_texture is not None:
+        raise ValueError(f"{material} has textures that have no counterpart in Mitsuba")
+    alpha: Any = max(material.roughness**2, MIN_ALPHA)
+    rough = material.metallic_roughness_texture
+    if rough is not None:
+        # Squares are not interpolated as their roots are.
+        if rough.filter != "nearest" or rough.bitmap.pixels.dtype != np.float32:
+            raise ValueError(f"{material} interpolates roughness, which Mitsuba does for its square")
+        squared = (material.roughness * rough.bitmap.pixels[..., 1:2]) ** 2
+        alpha = bitmap(replace(rough, bitmap=Bitmap(np.maximum(squared, MIN_ALPHA))), is_color=False)
+    white = material.base_color == (1, 1, 1) and material.base_color_texture is None
     if material.transmission == 1 and white and not any(material.absorption):
         if material.roughness == 0:
             return {"type": "dielectric", "int_ior": material.ior, "ext_ior": 1.0}
@@ -53,14 +81,40 @@ def bsdf(material: Material) -> dict[str, Any]:
         metal = {"type": "roughconductor", "material": "none", "distribution": "ggx", "alpha": alpha}
         return {"type": "twosided", "bsdf": metal}
     if material.metallic == material.specular == material.transmission == 0:
-        reflectance = {"type": "rgb", "value": list(material.base_color)}
+        reflectance = colored(material.base_color, material.base_color_texture)
         return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": reflectance}}
     raise ValueError(f"{material} has no counterpart in Mitsuba")
 
 
+def colored(factor: tuple[float, float, float], texture: Texture | None) -> dict[str, Any]:
+    """A colour, or a texture of which it is the factor."""
+    if texture is None:
+        return {"type": "rgb", "value": list(factor)}
+    pixels = linear_colors(texture.bitmap) * np.asarray(factor, np.float32)
+    return bitmap(replace(texture, bitmap=Bitmap(pixels)), is_color=True)
+
+
+def bitmap(texture: Texture, is_color: bool) -> dict[str, Any]:
+    """A texture of linear floats, or of plain numbers. Raises ValueError where both axes are wrapped
+    otherwise."""
+    if texture.wrap[0] != texture.wrap[1] or texture.uv_set != 0:
+        raise ValueError(f"{texture} has no counterpart in Mitsuba")
+    pixels = texture.bitmap.pixels
+    if pixels.dtype != np.float32:
+        if is_color:
+            raise ValueError(f"{texture} is encoded")
+        pixels = (pixels / np.iinfo(pixels.dtype).max).astype(np.float32)
+    rows = np.vstack([texture.matrix, [0, 0, 1]])
+    return {
+        "type": "bitmap", "bitmap": mi.Bitmap(np.array(pixels)), "raw": True, "wrap_mode": texture.wrap[0],
+        "filter_type": texture.filter, "to_uv": mi.ScalarTransform3f(rows.tolist()), "format": "variant",
+    }  # fmt: skip
+
+
 def mesh(obj: Object, material: Material, path: Path) -> dict[str, Any]:
     """The triangles in world space by way of a PLY file."""
-    write_ply(path, *world_mesh(obj))
+    vertices, faces, normals, uvs = world_mesh(obj, bool(_textures(material)))
+    write_ply(path, vertices, faces, normals, uvs)
     shape = {
         "type": "ply",
         "filename": str(path),
@@ -68,24 +122,34 @@ def mesh(obj: Object, material: Material, path: Path) -> dict[str, Any]:
         "bsdf": bsdf(material),
     }
     if material.is_emissive:
-        shape["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": list(material.emission)}}
+        shape["emitter"] = {"type": "area", "radiance": colored(material.emission, material.emission_texture)}
     return shape
 
 
+def _textures(material: Material) -> list[Texture]:
+    return [texture for slot in TextureSlot if (texture := texture_of(material, slot)) is not None]
+
+
+Floats = npt.NDArray[np.float32]
+
+
 def world_mesh(
-    obj: Object,
-) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32], npt.NDArray[np.float32] | None]:
-    """Vertices (V, 3), faces (F, 3), and normals (V, 3) where the object has some: then every corner is a
-    vertex of its own."""
+    obj: Object, with_uvs: bool = False
+) -> tuple[Floats, npt.NDArray[np.int32], Floats | None, Floats | None]:
+    """Vertices (V, 3), faces (F, 3), and normals (V, 3) and texture coordinates (V, 2) where the object has
+    some: then every corner is a vertex of its own."""
     matrix = obj.world_from_object
-    vertices, faces, normals = obj.mesh.vertices, obj.mesh.faces, None
-    if obj.mesh.normals is not None:
+    vertices, faces, normals, uvs = obj.mesh.vertices, obj.mesh.faces, None, None
+    if with_uvs and obj.mesh.uvs:
+        uvs = obj.mesh.uvs[0].reshape(-1, 2)
+    if obj.mesh.normals is not None or uvs is not None:
         vertices = vertices[faces].reshape(-1, 3)
         faces = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
+    if obj.mesh.normals is not None:
         turned = obj.mesh.normals.reshape(-1, 3) @ np.linalg.inv(matrix[:, :3])
         normals = (turned / np.linalg.norm(turned, axis=1, keepdims=True)).astype(np.float32)
     placed = vertices @ matrix[:, :3].T + matrix[:, 3]
-    return placed.astype(np.float32), faces, normals
+    return placed.astype(np.float32), faces, normals, uvs
 
 
 def write_ply(
@@ -93,10 +157,17 @@ def write_ply(
     vertices: npt.NDArray[np.float32],
     faces: npt.NDArray[np.int32],
     normals: npt.NDArray[np.float32] | None,
+    uvs: npt.NDArray[np.float32] | None = None,
 ) -> None:
     """A binary PLY file."""
-    columns = vertices if normals is None else np.hstack([vertices, normals])
-    names = ["x", "y", "z", "nx", "ny", "nz"][: columns.shape[1]]
+    columns = np.hstack([part for part in (vertices, normals, uvs) if part is not None])
+    names = [
+        "x",
+        "y",
+        "z",
+        *(["nx", "ny", "nz"] if normals is not None else []),
+        *(["u", "v"] if uvs is not None else []),
+    ]
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(columns)}"]
     lines += [f"property float {name}" for name in names]
     lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", ""]

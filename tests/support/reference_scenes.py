@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from incpt.benchmarks.kit.scenes import cube, lamp, matte, metal, plane
 from incpt.formats.images import load_image
@@ -13,6 +15,7 @@ from incpt.scene.environment import Environment
 from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
+from incpt.scene.texture import Bitmap, Texture
 
 SIZE = (64, 48)
 _ROOT = Path(__file__).parents[2]
@@ -122,10 +125,78 @@ def frosted() -> Scene:
     return Scene(Camera((0, 1.2, 3.6), (0, 0.5, 0), fov_y=38), sky, materials, objects)
 
 
+def _pattern(seed: int, height: int = 12, width: int = 16) -> Bitmap:
+    """Coloured noise that is smooth over a few pixels, as 8-bit sRGB."""
+    rng = np.random.default_rng(seed)
+    coarse = rng.uniform(20, 250, (height // 4, width // 4, 3))
+    fine = np.kron(coarse, np.ones((4, 4, 1))) + rng.uniform(-20, 5, (height, width, 3))
+    return Bitmap(np.clip(fine, 0, 255).astype(np.uint8))
+
+
+def _dents(height: int = 16, width: int = 16, slope: float = 0.2) -> Bitmap:
+    """A normal map of dents, in floats."""
+    y, x = np.mgrid[:height, :width]
+    leans = np.stack([slope * np.sin(2 * np.pi * x / width), slope * np.cos(2 * np.pi * y / height)], axis=-1)
+    normal = np.concatenate([leans, np.ones((height, width, 1))], axis=-1)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    return Bitmap(((normal + 1) / 2).astype(np.float32))
+
+
+def textured() -> Scene:
+    """Images on matte things: interpolated and not, repeated, mirrored, turned, on flat and on round
+    meshes."""
+    materials = {
+        "floor": replace(matte(1, 1, 1), base_color_texture=Texture(_pattern(1), scale=(3, 2), rotation=25)),
+        "wall": replace(
+            matte(0.9, 0.8, 1), base_color_texture=Texture(_pattern(2), wrap="mirror", scale=(2, 2))
+        ),
+        "cube": replace(matte(1, 1, 1), base_color_texture=Texture(_pattern(3), filter="nearest")),
+        "ball": replace(matte(1, 1, 1), base_color_texture=Texture(_pattern(4), scale=(2, 1))),
+        "lamp": lamp(9, 8, 7),
+    }  # fmt: skip
+    objects = (
+        plane("floor", "floor", (0, 0, 0), (0, 0, 0), (6, 1, 6)),
+        plane("wall", "wall", (0, 1, -1.5), (90, 0, 0), (6, 1, 3)),
+        plane("lamp", "lamp", (0.8, 2.4, 0.8), (180, 0, 0), (0.8, 1, 0.8)),
+        cube("cube", "cube", (-0.8, 0.5, 0), (0, 30, 0), (1, 1, 1)),
+        Object("ball", shape("sphere"), "ball", (0.7, 0.5, 0.1), (0, 40, 0)),
+    )
+    sky = Environment(color=(0.3, 0.35, 0.4))
+    return Scene(Camera((0, 1.2, 3.4), (0, 0.5, 0), fov_y=40), sky, materials, objects)
+
+
+def embossed() -> Scene:
+    """Normal maps on matte walls, and metal of which the roughness is an image, in light of a lamp that is
+    one."""
+    rough = np.random.default_rng(5).uniform(0.35, 0.8, (4, 4, 3)).astype(np.float32)
+    rough[..., 2] = 1  # metallic everywhere
+    screen = np.zeros((6, 8, 3), np.uint8)
+    screen[1:3, 1:4], screen[4:, 5:7] = (255, 190, 120), (90, 160, 255)
+    materials = {
+        "floor": replace(matte(0.6, 0.6, 0.6), normal_texture=Texture(_dents(), scale=(4, 4))),
+        "wall": replace(matte(0.5, 0.4, 0.6), normal_texture=Texture(_dents(slope=0.3), scale=(6, 3))),
+        "metal": Material(
+            (1, 1, 1), metallic=1, roughness=1, specular=0,
+            metallic_roughness_texture=Texture(Bitmap(rough), filter="nearest"),
+        ),
+        "screen": replace(lamp(14, 14, 14), emission_texture=Texture(Bitmap(screen))),
+    }  # fmt: skip
+    objects = (
+        plane("floor", "floor", (0, 0, 0), (0, 0, 0), (6, 1, 6)),
+        plane("wall", "wall", (0, 1, -1.5), (90, 0, 0), (6, 1, 3)),
+        plane("screen", "screen", (-1.9, 1.2, 0.3), (0, -90, 90), (1.6, 1, 1.2)),
+        cube("metal", "metal", (0.5, 0.5, 0), (0, 30, 0), (1, 1, 1)),
+    )
+    sky = Environment(color=(0.1, 0.12, 0.15))
+    return Scene(Camera((0, 1.2, 3.4), (0, 0.5, 0), fov_y=40), sky, materials, objects)
+
+
 REFERENCES = {
     "cornell": Reference(cornell, 3),
     "glass": Reference(glass, 20),
     "plates": Reference(plates, 3),
     "environment": Reference(environment, 3),
     "frosted": Reference(frosted, 20),
+    "textured": Reference(textured, 3),
+    "embossed": Reference(embossed, 3),
 }

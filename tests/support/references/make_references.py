@@ -1,6 +1,7 @@
 """Renders the scenes of support/reference_scenes.py with Mitsuba 3, and stores what test_mitsuba.py reads.
 
-    pip install mitsuba                    # 3.9 made the stored files; its LLVM variant needs libLLVM
+    pip install mitsuba                    # 3.9 made the stored files; its LLVM variant needs libLLVM;
+                                           # MITSUBA_VARIANT=scalar_rgb does without
     python tests/support/references/make_references.py [NAME ...]
 
 Each NAME.npz holds `mean` (48, 64, 3) and `error` (same shape), the standard error of that mean from sixteen
@@ -9,6 +10,7 @@ independent renders, both float16.
 
 from __future__ import annotations
 
+import os
 import sys
 import tempfile
 from pathlib import Path
@@ -42,7 +44,7 @@ def render(reference: Reference) -> tuple[Any, Any]:
 
 def main(names: list[str]) -> None:
     """Render the named scenes, or all."""
-    mi.set_variant("llvm_ad_rgb")
+    mi.set_variant(os.environ.get("MITSUBA_VARIANT", "llvm_ad_rgb"))
     for name in names or list(REFERENCES):
         mean, error = render(REFERENCES[name])
         np.savez_compressed(
