@@ -11,6 +11,8 @@
 #define PAIR_LIGHT(ray) (2u + 4u * (ray))
 #define PAIR_CHOICE(ray) (3u + 4u * (ray))
 #define PAIR_LUCK(ray) (4u + 4u * (ray))
+// Of the surfaces that a ray and the shadow ray behind it go through.
+#define PAIR_COVERAGE(ray, layer) (5u + 4u * MOST_RAYS + MOST_LAYERS * (ray) + (layer))
 
 typedef struct {
     float u, v;

@@ -64,8 +64,7 @@ INLINE void store_result(const State *state, uint path, uint result) {
     store_bits(state->paths, PATH_RESULT * BLOCK_STRIDE + path, result);
 }
 
-INLINE RawHit load_raw_hit(const Block *block, uint path) {
-    __local const float *hits = PLANES(block->memory, RAW_HITS);
+INLINE RawHit load_hit(__local const float *hits, uint path) {
     RawHit hit;
     hit.distance = hits[RAW_HIT_DISTANCE * BLOCK_STRIDE + path];
     hit.object = load_bits(hits, RAW_HIT_OBJECT * BLOCK_STRIDE + path);
@@ -76,14 +75,21 @@ INLINE RawHit load_raw_hit(const Block *block, uint path) {
     return hit;
 }
 
-INLINE void store_raw_hit(const Block *block, uint path, const RawHit *hit) {
-    __local float *hits = PLANES(block->memory, RAW_HITS);
+INLINE RawHit load_raw_hit(const Block *block, uint path) {
+    return load_hit(PLANES(block->memory, RAW_HITS), path);
+}
+
+INLINE void store_hit(__local float *hits, uint path, const RawHit *hit) {
     hits[RAW_HIT_DISTANCE * BLOCK_STRIDE + path] = hit->distance;
     store_bits(hits, RAW_HIT_OBJECT * BLOCK_STRIDE + path, hit->object);
     store_bits(hits, RAW_HIT_TRIANGLE * BLOCK_STRIDE + path, hit->triangle);
 #pragma unroll
     for (uint i = 0; i < 3; i++)
         hits[(RAW_HIT_WEIGHT_A + i) * BLOCK_STRIDE + path] = hit->weight[i];
+}
+
+INLINE void store_raw_hit(const Block *block, uint path, const RawHit *hit) {
+    store_hit(PLANES(block->memory, RAW_HITS), path, hit);
 }
 
 // Traversals that keep the top level and the tree of an object on one stack: its size, with room for a whole

@@ -233,11 +233,24 @@ INLINE bool interleaved_turn(InterleavedRay *ray, const Geometry *geometry, __lo
     return !(any && met);
 }
 
-// Ends the way of a ray: stores its hit, or, with `any`, adds the radiance of a shadow ray that nothing is in
-// the way of. With BRUTE_FORCE there is a raw hit already, which stays where the trees have nothing nearer.
-INLINE void interleaved_end(const InterleavedRay *ray, const Block *block, const bool any) {
+// What rays look for: the nearest hits of paths; whether anything is in the way of shadow rays; or what is
+// first in their way.
+#define FIND_NEAREST 0u
+#define FIND_ANY 1u
+#define FIND_NEAREST_SHADOW 2u
+
+// Ends the way of a ray: stores its hit, or, for FIND_ANY, adds the radiance of a shadow ray that nothing is
+// in the way of. With BRUTE_FORCE there is a raw hit already, which stays where the trees have nothing
+// nearer.
+INLINE void interleaved_end(const InterleavedRay *ray, const Block *block, const uint what) {
     const int met = ray->hit.object != NO_INDEX;
-    if (any) {
+#ifdef CUTOUTS
+    if (what == FIND_NEAREST_SHADOW) {
+        store_hit(PLANES(block->memory, SHADOW_HITS), ray->path, &ray->hit);
+        return;
+    }
+#endif
+    if (what == FIND_ANY) {
         if (!met)
             accumulate(&block->state, load_result(&block->state, ray->path),
                        load_light_sample(&block->state, ray->path).radiance);
@@ -250,14 +263,16 @@ INLINE void interleaved_end(const InterleavedRay *ray, const Block *block, const
     store_raw_hit(block, ray->path, &ray->hit);
 }
 
-INLINE float interleaved_limit(const Block *block, uint path, const bool any) {
-    return any ? block->state.shadows[SHADOW_DISTANCE * BLOCK_STRIDE + path] : nearest_limit(block, path);
+INLINE float interleaved_limit(const Block *block, uint path, const uint what) {
+    return what != FIND_NEAREST ? block->state.shadows[SHADOW_DISTANCE * BLOCK_STRIDE + path]
+                                : nearest_limit(block, path);
 }
 
-// The rays of the first `count` paths in the list: their nearest hits, or, with `any`, what their shadow rays
-// bring. `prepared` are planes of all rays that are in `rays`.
+// The rays of the first `count` paths in the list: their nearest hits, or what their shadow rays bring or
+// meet. `prepared` are planes of all rays that are in `rays`.
 INLINE void interleaved_trace(const Block *block, __local const float *rays, __local const float *prepared,
-                              uint count, const bool any) {
+                              uint count, const uint what) {
+    const bool any = what == FIND_ANY;
     const Geometry *geometry = &block->geometry;
     __local const uint *list = UINT_PLANES(block->memory, LIST);
     InterleavedRay all[INTERLEAVED_RAYS];
@@ -266,20 +281,20 @@ INLINE void interleaved_trace(const Block *block, __local const float *rays, __l
     for (; under_way < INTERLEAVED_RAYS && started < count; under_way++, started++) {
         order[under_way] = all + under_way;
         interleaved_start(all + under_way, geometry, prepared, rays, list[started],
-                          interleaved_limit(block, list[started], any));
+                          interleaved_limit(block, list[started], what));
     }
     while (under_way > 0) {
         for (uint i = 0; i < under_way; i++) {
             InterleavedRay *ray = order[i];
             if (interleaved_turn(ray, geometry, rays, any))
                 continue;
-            interleaved_end(ray, block, any);
+            interleaved_end(ray, block, what);
             if (started == count) {
                 order[i] = order[--under_way];
                 continue;
             }
             interleaved_start(ray, geometry, prepared, rays, list[started],
-                              interleaved_limit(block, list[started], any));
+                              interleaved_limit(block, list[started], what));
             started++;
         }
     }
@@ -297,7 +312,7 @@ STAGE void interleaved_nearest(const Block *block, uint count, uint listed) {
     __local float *prepared = PLANES(block->memory, PREPARED);
     if (listed > 0)
         prepare_rays(prepared, block->traced.rays, count);
-    interleaved_trace(block, block->traced.rays, prepared, listed, false);
+    interleaved_trace(block, block->traced.rays, prepared, listed, FIND_NEAREST);
 }
 
 #ifdef LIGHT_SAMPLING
@@ -306,7 +321,16 @@ STAGE void interleaved_nearest(const Block *block, uint count, uint listed) {
 STAGE void interleaved_any(const Block *block, uint count, uint listed) {
     __local float *prepared = PLANES(block->memory, PREPARED_SHADOWS);
     prepare_rays(prepared, block->state.shadows, count);
-    interleaved_trace(block, block->state.shadows, prepared, listed, true);
+    interleaved_trace(block, block->state.shadows, prepared, listed, FIND_ANY);
 }
+
+#ifdef CUTOUTS
+// As interleaved_any, but finds what is first in the way of each shadow ray.
+STAGE void interleaved_nearest_shadow(const Block *block, uint count, uint listed) {
+    __local float *prepared = PLANES(block->memory, PREPARED_SHADOWS);
+    prepare_rays(prepared, block->state.shadows, count);
+    interleaved_trace(block, block->state.shadows, prepared, listed, FIND_NEAREST_SHADOW);
+}
+#endif
 #endif
 #endif

@@ -17,6 +17,9 @@
 #include "path/setup_surface.cl"
 #include "path/shade_miss.cl"
 #include "cpu/interleaved.cl"
+#ifdef CUTOUTS
+#include "cpu/cutouts.cl"
+#endif
 #include "path/generate.cl"
 #include "path/sample_lights.cl"
 #include "path/shade_medium.cl"
@@ -133,6 +136,9 @@ STAGE void classify_hits(const Block *block, BlockRay *ray) {
 // The stage `intersect` up to what rays meet.
 INLINE void trace_rays(const Block *block, BlockRay *ray) {
     ray->count = trace_nearest(block, ray->count, ray->number == 0);
+#ifdef CUTOUTS
+    pass_cutouts(block, ray->count);
+#endif
     classify_hits(block, ray);
 }
 
@@ -337,6 +343,10 @@ STAGE void touch_shadow_rays(const Block *block, const BlockRay *ray) {
 // Traces the shadow rays that paths ask for, and adds what they bring.
 STAGE void trace_shadows(const Block *block, const BlockRay *ray) {
     const uint count = ray->count;
+#ifdef CUTOUTS
+    trace_shadows_through_cutouts(block, count);
+    return;
+#endif
 #ifdef BRUTE_FORCE
     uint listed = brute_force_any(block, count);
 #else

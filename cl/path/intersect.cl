@@ -1,5 +1,5 @@
+#include "path/coverage.cl"
 #include "path/map_normal.cl"
-#include "path/setup_surface.cl"
 #include "path/trace.cl"
 
 // Finds the nearest hit of each path's ray, and what the surface is like there. The hint keeps compilers from
@@ -13,14 +13,33 @@ __kernel __attribute__((vec_type_hint(float8))) void intersect(LAUNCH_PARAMETERS
     const State state = STATE_OF(params);
     const Geometry geometry = {GEOMETRY_ARGUMENTS};
     RawHit hit;
-    if (!trace_path(&geometry, &state, path, &hit)) {
+#ifdef CUTOUTS
+    const Shading shading = {SHADING_ARGUMENTS};
+    const Path p = load_path(&state, path);
+    Ray ray = load_ray(rays, state.stride, path);
+    float travelled = 0.0f;
+    bool met = bvh_nearest(&geometry, ray, INFINITY, &hit);
+    for (uint layer = 0u; met && layer < MOST_LAYERS; layer++) {
+        if (!passes_hit(&params, &geometry, &shading, &p, &hit, layer, 0))
+            break;
+        travelled += hit.distance;
+        ray.origin = behind_hit(&geometry, &hit, ray.direction);
+        met = bvh_nearest(&geometry, ray, INFINITY, &hit);
+    }
+    hit.distance += travelled;
+#else
+    const bool met = trace_path(&geometry, &state, path, &hit);
+#endif
+    if (!met) {
         store_bits(surfaces, SURFACE_OBJECT * state.stride + path, NO_INDEX);
         store_class(&state, path, CLASS_MISS);
         return;
     }
     Surface surface = surface_at(&geometry, &hit);
 #if TEXTURED(NORMAL)
+#ifndef CUTOUTS
     const Shading shading = {SHADING_ARGUMENTS};
+#endif
     map_normal(objects, &shading, &surface);
 #endif
     store_surface(&state, path, &surface);

@@ -96,6 +96,10 @@ REGIONS = (
     # Rays that are ready for interleaved traversal: see PREPARED_INVERSE.
     Region("prepared", 13, Phase.TRACE),
     Region("prepared_shadows", 13, Phase.SHADOW_TRACE),
+    # How far rays have come that go through what does not cover.
+    Region("travelled", 1, Phase.TRACE),
+    # As raw_hits, of shadow rays where surfaces may let them through.
+    Region("shadow_hits", len(layout.RawHitPlane), Phase.SHADOW_TRACE),
     # Half of the paths wait here while the other half moves together.
     Region("moved", 1, Phase.GATHER),
     # Shadow rays with the same largest component, up to and with their radiance; the place where each adds

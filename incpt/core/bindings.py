@@ -495,7 +495,7 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     "shade": (LAUNCH, LIST, SHADING, PATH_STATE),
     "shade_medium": (LAUNCH, LIST, SHADING, PATH_STATE, COUNTERS),
     "shade_miss": (LAUNCH, LIST, SHADING, EMITTERS, PATH_STATE),
-    "trace_shadow": (LAUNCH, LIST, GEOMETRY, PATH_STATE),
+    "trace_shadow": (LAUNCH, LIST, GEOMETRY, SHADING, PATH_STATE),
     "write_aovs": (LAUNCH, LIST, SHADING, PATH_STATE),
     "touch_rays": (LAUNCH, LIST, PATH_STATE, CHANGES),
     "touch_lights": (LAUNCH, LIST, SHADING, EMITTERS, PATH_STATE, CHANGES),

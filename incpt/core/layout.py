@@ -54,6 +54,9 @@ MOST_RAYS = 256
 MOST_RAYS_IN_MEDIA = 250
 """Rays after which no path goes on from a transparent body. Those left are for the opaque surfaces behind."""
 
+MOST_LAYERS = 64
+"""Surfaces that cover in part which a ray goes through at most; the next one covers all."""
+
 MIN_ALPHA = 1e-3
 """Least GGX alpha: below it GGX is a mirror to float precision. A dielectric is smooth there, an opaque
 surface stays this rough."""
@@ -434,10 +437,13 @@ class SlotFlag(IntFlag):
 
 
 class MaterialFlag(IntFlag):
-    """Properties of a material that choose a kernel or a branch."""
+    """Properties of a material that choose a kernel or a branch. CUTOUT: it covers a share of what is behind
+    it, alpha; MASKED: all where alpha is at least the cutoff, and nothing elsewhere."""
 
     DOUBLE_SIDED = 1
     TRANSMISSIVE = 2
+    CUTOUT = 4
+    MASKED = 8
 
 
 class TextureSlot(IntEnum):
@@ -611,6 +617,8 @@ MATERIAL = _packed(
         ("light_pdf", np.float32),  # area density with which light sampling finds a point of this emitter
         ("priority", np.uint32),
         ("flags", np.uint32),
+        ("alpha", np.float32),
+        ("alpha_cutoff", np.float32),
         ("normal_scale", np.float32),  # of the deflections of its normal map
         ("textures", np.uint32, (len(TextureSlot),)),  # rows of TEXTURE; 0 is white
     ]

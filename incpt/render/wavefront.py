@@ -43,7 +43,7 @@ _CLASSES = {path_list: PathClass[path_list.name] for path_list in PathList}
 _LIGHTS = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS")
 _TEXTURES = ("TEXTURES", "VERTEX_COLORS")
 _FEATURES: Mapping[str | None, tuple[str, ...]] = {
-    "intersect": _TEXTURES,
+    "intersect": (*_TEXTURES, "CUTOUTS"),
     "shade_miss": (*_LIGHTS, "MEDIA"),
     "sample_lights": (*_LIGHTS, *_TEXTURES),
     "touch_lights": (*_LIGHTS, *_TEXTURES),
@@ -51,6 +51,7 @@ _FEATURES: Mapping[str | None, tuple[str, ...]] = {
     "shade": (*_LIGHTS, *_TEXTURES),
     "write_aovs": _TEXTURES,
     "first_hits": _TEXTURES,
+    "trace_shadow": (*_TEXTURES, "CUTOUTS"),
 }
 """The features of a scene without which a kernel would leave something out. Those that would only make it
 quicker, as they do blocks, would be more variants to build."""
@@ -124,7 +125,8 @@ class Wavefront:
         """See `tracer.Tracer`."""
         chunk = self._chunk(batch, 0, 0)
         kernels = dict.fromkeys((one.kernel, one.features) for one in chunk.launches)
-        del kernels["intersect", _chosen(batch.features, _TEXTURES)]  # first hits need it too
+        # First hits need it too.
+        del kernels["intersect", _chosen(batch.features, _FEATURES["intersect"])]
         return [
             *self.idle_first_hits(batch),
             *self._idle(
@@ -202,7 +204,7 @@ class Wavefront:
 
     def _intersect(self, chunk: _Chunk, size: int) -> None:
         """Trace the camera rays of a chunk."""
-        features = _chosen(chunk.batch.features, _TEXTURES)
+        features = _chosen(chunk.batch.features, _FEATURES["intersect"])
         self._launch_listed("intersect", chunk, 0, size, PathList.LIVE, features)
 
     def _first_hits(self, chunk: _Chunk, surface: cl.Buffer, object_ids: cl.Buffer) -> None:

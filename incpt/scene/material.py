@@ -6,10 +6,13 @@ from dataclasses import dataclass
 from types import NoneType
 
 from incpt.core.affine import Vector
-from incpt.core.checks import require, require_bool, whole
+from incpt.core.checks import one_of, require, require_bool, whole
 from incpt.core.layout import TextureSlot
 from incpt.scene.checks import set_number, set_vector
 from incpt.scene.texture import Texture
+
+ALPHA_MODES = ("opaque", "mask", "blend")
+"""What alpha says, as in glTF."""
 
 
 @dataclass(frozen=True)
@@ -19,6 +22,11 @@ class Material:
     GGX alpha is `roughness` squared. `absorption` is per metre inside a transmissive body, `priority`
     orders nested dielectrics (the higher wins, 0 is the highest of all), `emission` is radiance, from
     the front side only unless `double_sided`. `specular` scales the dielectric layer: 0 is Lambertian.
+
+    `alpha`, times that of `base_color_texture` and of colours at corners, is the share of what is behind a
+    surface that it covers where `alpha_mode` is "blend"; "mask" covers all where it is at least
+    `alpha_cutoff` and nothing elsewhere; "opaque" takes no notice of it. What covers in part is no light for
+    light sampling.
 
     Numbers are multiplied with what their textures say at a point: `base_color_texture` and
     `emission_texture` by colours in sRGB (where their bitmaps are bytes or 16-bit numbers),
@@ -37,6 +45,9 @@ class Material:
     priority: int = 0
     emission: Vector = (0.0, 0.0, 0.0)
     double_sided: bool = False
+    alpha: float = 1.0
+    alpha_mode: str = "opaque"
+    alpha_cutoff: float = 0.5
     normal_scale: float = 1.0
     base_color_texture: Texture | None = None
     metallic_roughness_texture: Texture | None = None
@@ -54,10 +65,18 @@ class Material:
         set_vector(self, "emission", low=0.0)
         object.__setattr__(self, "priority", whole("priority", self.priority, 0, 1000))
         require_bool("double_sided", self.double_sided)
+        for name in ("alpha", "alpha_cutoff"):
+            set_number(self, name, 0.0, 1.0)
+        one_of("alpha_mode", self.alpha_mode, ALPHA_MODES)
         set_number(self, "normal_scale", 0.0, 100.0)
         for slot in TextureSlot:
             name = texture_name(slot)
             require(name, getattr(self, name), (Texture, NoneType), "a Texture")
+
+    @property
+    def is_cutout(self) -> bool:
+        """Whether rays may go through it by its alpha."""
+        return self.alpha_mode != "opaque"
 
     @property
     def is_emissive(self) -> bool:

@@ -79,6 +79,8 @@ def difference(old: Scene, new: Scene) -> Difference:
         *_shown(old, _displaced(change) - change.added),
         *_shown(new, _displaced(change) - change.removed),
     ]
+    # Rays that went through them need not end on them now, and the other way round.
+    placed += [*_changed_cutouts(old, old, new, change), *_changed_cutouts(new, old, new, change)]
     # Paths start in the media around the camera, whose boundaries they need not meet.
     placed += [*_changed_around_camera(old, change), *_changed_around_camera(new, change)]
     boxes = np.array([obj.world_bounds for obj in placed]).reshape(-1, 2, 3)
@@ -104,6 +106,23 @@ def _changed_around_camera(scene: Scene, change: Change) -> list[Object]:
         if (obj.material in change.materials or obj.name in change.reassigned)
         and obj.visible
         and has_in_bounds(obj, scene.camera.position)
+    ]
+
+
+def _changed_cutouts(scene: Scene, old: Scene, new: Scene, change: Change) -> list[Object]:
+    """The objects of a scene, which is one of the two, that have another material, by its name or by what it
+    is, where either covers in part."""
+    cutouts = {
+        name for materials in (old.materials, new.materials) for name, m in materials.items() if m.is_cutout
+    }
+    if not cutouts:
+        return []
+    reassigned = {
+        name for name in change.reassigned if {old.object(name).material, new.object(name).material} & cutouts
+    }
+    changed = change.materials & cutouts
+    return [
+        obj for obj in scene.objects if obj.visible and (obj.material in changed or obj.name in reassigned)
     ]
 
 

@@ -38,7 +38,10 @@ def luminance(color: npt.ArrayLike) -> Array:
 
 
 def radiant_weight(material: Material) -> float:
-    """Power per area that counts in choosing lights: luminance, twice where both sides shine."""
+    """Power per area that counts in choosing lights: luminance, twice where both sides shine. What covers in
+    part is left to the rays that meet it."""
+    if material.is_cutout:
+        return 0.0
     return float(luminance(material.emission)) * (2.0 if material.double_sided else 1.0)
 
 

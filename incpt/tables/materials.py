@@ -15,7 +15,7 @@ from incpt.tables import albedo
 from incpt.tables.textures import TextureTables
 
 _COPIED = ("base_color", "metallic", "emission", "roughness", "absorption", "specular", "ior", "transmission",
-           "priority", "normal_scale")  # fmt: skip
+           "priority", "alpha", "alpha_cutoff", "normal_scale")  # fmt: skip
 """What rows take over from materials as it is."""
 
 
@@ -27,6 +27,7 @@ class MaterialTables:
     is_matte         whether no surface that may be shaded as opaque has a specular layer or is metallic
     is_media_clear   whether none that lets light through absorbs any of it
     is_media_smooth  whether none that lets light through is rough
+    has_cutouts      whether any covers what is behind it in part only
     """
 
     buffers: Mapping[str, cl.Buffer]
@@ -34,6 +35,7 @@ class MaterialTables:
     is_matte: bool
     is_media_clear: bool
     is_media_smooth: bool
+    has_cutouts: bool
 
 
 def material_tables(
@@ -52,8 +54,11 @@ def material_tables(
         for field in _COPIED:
             row[field] = getattr(material, field)
         row["light_pdf"] = densities.get(name, 0.0)
-        row["flags"] = (flags.DOUBLE_SIDED if material.double_sided else 0) | (
-            flags.TRANSMISSIVE if material.transmission > 0 else 0
+        row["flags"] = (
+            flags.DOUBLE_SIDED * material.double_sided
+            | flags.TRANSMISSIVE * (material.transmission > 0)
+            | flags.CUTOUT * material.is_cutout
+            | flags.MASKED * (material.alpha_mode == "mask")
         )
         row["textures"] = textures.numbers_of(material)
         layer[:] = albedo.layer_row(material)
@@ -66,4 +71,5 @@ def material_tables(
         is_matte=all(material.specular == material.metallic == 0 for material in opaque),
         is_media_clear=not any(any(material.absorption) for material in media),
         is_media_smooth=all(material.roughness**2 <= layout.MIN_ALPHA for material in media),
+        has_cutouts=any(material.is_cutout for material in materials.values()),
     )

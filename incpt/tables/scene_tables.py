@@ -61,6 +61,8 @@ class SceneTables:
         if name in ("objects", "textures", "attributes"):
             placed: PlacedObjects | TextureTables | AttributeTable = getattr(self, name)
             return placed.buffer
+        if name == "block_nodes" and not self.is_brute_force:
+            name = "top_nodes"
         if name == "texels":
             return self.textures.pool.texels
         return self._own_buffers.get(name) or self.pool.buffer(name)
@@ -89,7 +91,8 @@ class SceneTables:
             "SMOOTH_MEDIA": materials.has_media and materials.is_media_smooth,
             "CLEAR_MEDIA": materials.has_media and materials.is_media_clear,
             "MATTE": materials.is_matte,
-            "BRUTE_FORCE": top_level.is_brute_force,
+            "BRUTE_FORCE": self.is_brute_force,
+            "CUTOUTS": materials.has_cutouts,
             "VERTEX_COLORS": self.attributes.has_colors,
         }
         textures = (f"TEXTURES {self.textures.slots}u",) if self.textures.slots else ()
@@ -103,7 +106,13 @@ class SceneTables:
     @property
     def has_trees(self) -> bool:
         """Whether rays go through trees, beside what is tested by brute force."""
-        return not (self.top_level.all_in_world_space and self.top_level.is_brute_force)
+        return not (self.top_level.all_in_world_space and self.is_brute_force)
+
+    @property
+    def is_brute_force(self) -> bool:
+        """Whether blocks of paths test small meshes without a tree. Rays that may go on behind a hit take
+        trees, where few of many rays are traced again."""
+        return self.top_level.is_brute_force and not self.materials.has_cutouts
 
     @property
     def cluster_count(self) -> int:

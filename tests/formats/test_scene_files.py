@@ -26,7 +26,7 @@ from incpt.scene.change import diff
 from incpt.scene.checks import LARGEST
 from incpt.scene.environment import Environment
 from incpt.scene.image import Image
-from incpt.scene.material import Material
+from incpt.scene.material import ALPHA_MODES, Material
 from incpt.scene.mesh import Mesh, MeshSource
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
@@ -424,6 +424,9 @@ MATERIAL_VALUES: dict[str, st.SearchStrategy[Any]] = {
     "priority": st.integers(0, 1000),
     "emission": radiances,
     "double_sided": st.booleans(),
+    "alpha": fractions,
+    "alpha_mode": st.sampled_from(ALPHA_MODES),
+    "alpha_cutoff": fractions,
     "normal_scale": st.floats(0, 100),
     **dict.fromkeys(TEXTURES, st.one_of(st.none(), textures_strategy)),
 }

@@ -12,7 +12,7 @@ import pytest
 from support.kernels import device
 from support.pairs import check, traced_pairs
 from support.parameters import TEXTURES
-from support.renders import assert_same_mean, render, repeat
+from support.renders import assert_same_mean, device_with, render, repeat
 from support.small_scenes import mixed_scene, small_settings
 
 from incpt.core.affine import Vector
@@ -316,18 +316,6 @@ def test_light_and_bsdf_sampling_find_the_same_light_of_a_texture(double_sided: 
     for feature in ("MIS_ONLY_LIGHT", "MIS_ONLY_BSDF"):
         alone = repeat(scene, 512, max_bounces=0, on=device_with(feature))
         assert_same_mean(both, alone, relative=0.02)
-
-
-def device_with(feature: str) -> Any:
-    from incpt.device.device import Device
-
-    class Own(Device):
-        """Builds every kernel with one more feature."""
-
-        def kernel(self, name: str, file: str | None = None, features: tuple[str, ...] = ()) -> Any:
-            return super().kernel(name, file, (*features, feature))
-
-    return Own()
 
 
 def test_a_texture_of_emission_is_as_several_lamps() -> None:

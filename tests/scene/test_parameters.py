@@ -11,7 +11,7 @@ from incpt.core.errors import InputError
 from incpt.core.layout import MATERIAL
 from incpt.scene.material import Material
 
-DERIVED = {"double_sided": "flags", **dict.fromkeys(TEXTURES, "textures")}
+DERIVED = {"double_sided": "flags", "alpha_mode": "flags", **dict.fromkeys(TEXTURES, "textures")}
 """Parameters that kernels see in another form, and the field of the struct that holds it."""
 
 

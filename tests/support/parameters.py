@@ -26,6 +26,8 @@ def unlike_default(name: str) -> Any:
         return A_TEXTURE
     if isinstance(default, bool):
         return not default
+    if name == "alpha_mode":
+        return "blend"
     if isinstance(default, int):
         return default + 7
     if isinstance(default, tuple):

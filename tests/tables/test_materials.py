@@ -16,7 +16,8 @@ from incpt.scene.material import Material
 from incpt.tables.materials import MaterialTables, material_tables
 from incpt.tables.textures import texture_tables
 
-IN_FLAGS = {"double_sided": MaterialFlag.DOUBLE_SIDED, "transmission": MaterialFlag.TRANSMISSIVE}
+IN_FLAGS = {"double_sided": MaterialFlag.DOUBLE_SIDED, "transmission": MaterialFlag.TRANSMISSIVE,
+            "alpha_mode": MaterialFlag.CUTOUT}  # fmt: skip
 """Parameters that set a flag, `transmission` beside its own field."""
 
 

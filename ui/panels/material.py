@@ -48,7 +48,23 @@ def draw(material: Material, refusals: Refusals) -> Material:
     )
     ior = widgets.number("IOR", material.ior, low=1.0, high=4.0, speed=0.005, tip="Index of refraction")
     material = refusals.changed(material, ior=ior)
-    return _draw_emission(_draw_transmission(material, refusals), refusals)
+    material = _draw_transmission(_draw_alpha(material, refusals), refusals)
+    return _draw_emission(material, refusals)
+
+
+def _draw_alpha(material: Material, refusals: Refusals) -> Material:
+    with widgets.section("Cut-out", material.is_cutout) as is_open:
+        if not is_open:
+            return material
+        mode = widgets.choice(
+            "Alpha mode",
+            material.alpha_mode,
+            [("opaque", "Opaque"), ("mask", "Mask"), ("blend", "Blend")],
+            "Mask: covers all from the cutoff on; blend: covers that share of what is behind",
+        )
+        material = refusals.changed(material, alpha_mode=mode)
+        material = _draw_share(material, refusals, "alpha", "Alpha", "Times that of the base colour map")
+        return _draw_share(material, refusals, "alpha_cutoff", "Cutoff", "From which alpha on a mask covers")
 
 
 def _draw_transmission(material: Material, refusals: Refusals) -> Material:

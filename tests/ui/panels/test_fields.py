@@ -23,7 +23,9 @@ from incpt.ui.panels import textures
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
 from incpt.viewer.renderer import Pin, Restart
 
-SCENE = mixed_scene(size=(48, 32), strategy="spiral").with_material("red", normal_texture=A_TEXTURE)
+SCENE = mixed_scene(size=(48, 32), strategy="spiral").with_material(
+    "red", normal_texture=A_TEXTURE, alpha_mode="mask"
+)
 PREFERENCES = Preferences(
     display=DisplaySettings(overlay="spp"), snap=SnapSettings(enabled=True), navigation="blender"
 )
@@ -76,6 +78,8 @@ FIELDS = [
     Field("Object", "Transmission", "scene.materials.glass.transmission", "0.5", 0.5, BALL, -30),
     *vector("Object", "Absorption", "scene.materials.glass.absorption", BALL, "RGB"),
     Field("Object", "Priority", "scene.materials.glass.priority", "7", 7, BALL, 60),
+    Field("Object", "Alpha", "scene.materials.red.alpha", "0.25", 0.25, dragged=-30),
+    Field("Object", "Cutoff", "scene.materials.red.alpha_cutoff", "0.25", 0.25),
     Field("Object", "Normal strength", "scene.materials.red.normal_scale", "0.5", 0.5),
     *vector("Scene", "Camera", "scene.camera.position"),
     *vector("Scene", "Target", "scene.camera.target"),
@@ -104,6 +108,7 @@ FIELDS = [
 
 CHOICES = [
     ("Object", "Material", "Glass", "glass", f"{CUBE}.material"),
+    ("Object", "Alpha mode", "Blend", "blend", "scene.materials.red.alpha_mode"),
     ("Object", "Gizmo", "Rotate", "rotate", "tool.operation"),
     ("Object", "Axes", "The object's axes", "local", "tool.space"),
     ("Render", "Strategy", "Restart", "restart", "scene.settings.strategy"),
@@ -135,7 +140,17 @@ BUTTONS = [
     ("Render", "Restart", set()),
 ]
 
-SECTIONS = {"Transform", "Gizmo", "Material", "Textures", "Transmission", "Emission", "Camera", "Environment"}
+SECTIONS = {
+    "Transform",
+    "Gizmo",
+    "Material",
+    "Textures",
+    "Cut-out",
+    "Transmission",
+    "Emission",
+    "Camera",
+    "Environment",
+}
 SECTIONS |= {"Settings of the scene", "Display", "Measurements"}
 SHOWN_ONLY = {"Image", "Step time plot", "Device"}
 SHOWN_ONLY |= {f"   {label}" for label, _ in textures._LABELS.values()}
@@ -150,6 +165,7 @@ ELSEWHERE = {
 
 def test_every_parameter_of_a_material_has_a_row() -> None:
     used = [field.place for field in FIELDS] + [place for _, _, place in CHECKBOXES]
+    used += [place for _, _, _, _, place in CHOICES]
     material = {place.split(".")[3] for place in used if place.startswith("scene.materials.")}
     # Emission has two widgets of its own, tested below.
     assert material | {"emission", *TEXTURES} == {field.name for field in fields(Material)}
