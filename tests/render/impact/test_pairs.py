@@ -258,12 +258,12 @@ def test_lights_of_two_scenes_bring_what_those_of_each_bring(
     pool = GeometryPool.of(device)
     differs = False
     for chosen, scene in enumerate((old, new)):
-        plain = repeat(scene, 256, max_bounces=2)
+        plain = repeat(scene, 256, max_bounces=2, on=device)
         tables = paired_tables(pool, old, new)
         assert tables[chosen].lights.count >= len(lights.emissive_objects(scene))
         with monkeypatch.context() as patch:
             patch.setattr("incpt.render.session.tables_of", lambda *_, both=tables, i=chosen: both[i])
-            paired = repeat(scene, 256, max_bounces=2)
+            paired = repeat(scene, 256, max_bounces=2, on=device)
         assert_same_mean(plain, paired)
         differs |= bool((plain != paired).any())
     assert differs  # in one of the scenes at least others are chosen
