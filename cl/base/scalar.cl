@@ -134,6 +134,18 @@ INLINE float atan2_turns(float y, float x) {
     return y < 0.0f ? -angle : angle;
 }
 
+// asin(x), absolute error below 3e-7 (S. Moshier's, Cephes). Beyond 1 it is that of 1.
+INLINE float arcsine(float x) {
+    float a = MIN(FABS(x), 1.0f);
+    int steep = a > 0.5f;
+    float z = steep ? 0.5f * (1.0f - a) : a * a;
+    float s = steep ? SQRT(z) : a;
+    float p = 7.4953002686e-2f + z * (4.5470025998e-2f + z * (2.4181311049e-2f + z * 4.2163199048e-2f));
+    p = s + s * z * (1.6666752422e-1f + z * p);
+    float angle = steep ? 0.5f * PI - 2.0f * p : p;
+    return x < 0.0f ? -angle : angle;
+}
+
 // exp(x) for x <= 0, relative error below 2e-7; 0 where a float has no exponent left. 2^n times a polynomial
 // of the fraction (S. Moshier's, Cephes).
 INLINE float exp_negative(float x) {

@@ -15,6 +15,7 @@
 #endif
 #include "path/map_normal.cl"
 #include "path/setup_surface.cl"
+#include "path/shade_light.cl"
 #include "path/shade_miss.cl"
 #include "cpu/interleaved.cl"
 #ifdef CUTOUTS
@@ -52,6 +53,9 @@ typedef struct {
     // What it has led paths to: nothing, an opaque surface, or a boundary or the inside of a medium. Behind
     // setup_surfaces those on surfaces stand in front, and those in media follow.
     Subset misses, surfaces, media;
+#ifdef SHAPED_LIGHTS
+    Subset lights; // paths that end on one
+#endif
 } BlockRay;
 
 // Starts the paths of a block. With params.listed their places stand in a list.
@@ -109,6 +113,36 @@ STAGE uint trace_nearest(const Block *block, uint count, bool from_camera) {
 #define KEY_MISS 0
 #define KEY_SURFACE 1
 #define KEY_MEDIUM 2
+#define KEY_LIGHT 3
+
+#ifdef SHAPED_LIGHTS
+// Whether a ray ends on a light.
+INLINE uint is_light_hit(uint object) { return ((object & LIGHT_HIT) != 0u) & (object != NO_INDEX); }
+
+// One light after the other, for all rays: those that meet it before all else end there.
+STAGE void meet_lights(const Block *block, const BlockRay *ray) {
+    const State *traced = &block->traced;
+    __local float *hits = PLANES(block->memory, RAW_HITS);
+    __local float *distances = hits + RAW_HIT_DISTANCE * BLOCK_STRIDE;
+    __local uint *objects = (__local uint *)hits + RAW_HIT_OBJECT * BLOCK_STRIDE;
+    const uint count = ray->count, from_camera = ray->number == 0;
+    for (uint k = block->params->sun_count; k < block->params->shaped_count; k++) {
+        const ShapedLight light = load_shaped_light(block->params, &block->emitters, k);
+        if (!may_be_met(light.flags, from_camera, 0.0f))
+            continue;
+        LANES
+        for (int i = 0; i < (int)count; i++) {
+            float pdf = traced->paths[PATH_BSDF_PDF * BLOCK_STRIDE + i];
+            float limit = objects[i] == NO_INDEX ? INFINITY : distances[i];
+            float distance = distance_to_shaped_light(&light, load_ray(traced->rays, BLOCK_STRIDE, i));
+            int nearer =
+                may_be_met(light.flags, from_camera, pdf) & (distance * (1.0f - LIGHT_AHEAD) < limit);
+            distances[i] = nearer ? distance : distances[i];
+            objects[i] = nearer ? LIGHT_HIT | k : objects[i];
+        }
+    }
+}
+#endif
 
 // Sorts paths by what their rays have met.
 STAGE void classify_hits(const Block *block, BlockRay *ray) {
@@ -125,11 +159,17 @@ STAGE void classify_hits(const Block *block, BlockRay *ray) {
 #else
         keys[i] = hit ? KEY_SURFACE : KEY_MISS;
 #endif
+#ifdef SHAPED_LIGHTS
+        keys[i] = is_light_hit(object) ? KEY_LIGHT : keys[i];
+#endif
     }
     ray->misses = subset_where(keys, KEY_MISS, count, words);
     ray->surfaces = subset_where(keys, KEY_SURFACE, count, words + BLOCK_STRIDE);
 #ifdef MEDIA
     ray->media = subset_where(keys, KEY_MEDIUM, count, words + 2 * BLOCK_STRIDE);
+#endif
+#ifdef SHAPED_LIGHTS
+    ray->lights = subset_where(keys, KEY_LIGHT, count, words + 3 * BLOCK_STRIDE);
 #endif
 }
 
@@ -138,6 +178,9 @@ INLINE void trace_rays(const Block *block, BlockRay *ray) {
     ray->count = trace_nearest(block, ray->count, ray->number == 0);
 #ifdef CUTOUTS
     pass_cutouts(block, ray->count);
+#endif
+#ifdef SHAPED_LIGHTS
+    meet_lights(block, ray);
 #endif
     classify_hits(block, ray);
 }
@@ -163,6 +206,21 @@ STAGE void touch_rays(const Block *block, const BlockRay *ray) {
 }
 #endif
 
+#ifdef SHAPED_LIGHTS
+// Adds what lights bring to the paths that end on them.
+STAGE void shade_lights(const Block *block, const BlockRay *ray) {
+    __local uint *list = UINT_PLANES(block->memory, LIST);
+    const uint count = ray->lights.count;
+    list_subset(list, &ray->lights, 0);
+    LANES
+    for (int i = 0; i < (int)count; i++) {
+        const RawHit hit = load_raw_hit(block, list[i]);
+        shade_light_path(block->params, &block->shading, &block->emitters, &block->traced, list[i],
+                         load_result(&block->traced, list[i]), hit.object & ~LIGHT_HIT, hit.distance);
+    }
+}
+#endif
+
 STAGE void shade_misses(const Block *block, const BlockRay *ray) {
     __local uint *list = UINT_PLANES(block->memory, LIST);
     const uint count = ray->misses.count;
@@ -171,6 +229,14 @@ STAGE void shade_misses(const Block *block, const BlockRay *ray) {
     for (int i = 0; i < (int)count; i++)
         shade_miss_path(block->params, &block->shading, &block->emitters, &block->traced, list[i],
                         load_result(&block->traced, list[i]));
+#ifdef SHAPED_LIGHTS
+    for (uint k = 0; k < block->params->sun_count; k++) {
+        LANES
+        for (int i = 0; i < (int)count; i++)
+            shade_sun_path(block->params, &block->shading, &block->emitters, &block->traced, list[i],
+                           load_result(&block->traced, list[i]), k);
+    }
+#endif
 }
 
 // Moves a plane of all paths that have hit something, those on opaque surfaces in front.
@@ -240,7 +306,7 @@ STAGE void write_aovs(const Block *block, const BlockRay *ray) {
 }
 #endif
 
-#if defined(CHANGES) && defined(TRIANGLE_LIGHTS)
+#if defined(CHANGES) && (defined(TRIANGLE_LIGHTS) || defined(SHAPED_LIGHTS))
 // As touch_rays, of the lights that paths ask for, before they are shaded.
 STAGE void touch_lights(const Block *block, const BlockRay *ray) {
     const State *state = &block->state;
@@ -340,9 +406,31 @@ STAGE void touch_shadow_rays(const Block *block, const BlockRay *ray) {
 }
 #endif
 
+#ifdef SHAPED_LIGHTS
+// Drops the shadow rays that a light is in the way of, as surfaces are.
+STAGE void shade_by_lights(const Block *block, const BlockRay *ray) {
+    const State *state = &block->state;
+    __local const float *limits = state->shadows + SHADOW_DISTANCE * BLOCK_STRIDE;
+    const uint count = ray->count;
+    for (uint k = block->params->sun_count; k < block->params->shaped_count; k++) {
+        const ShapedLight light = load_shaped_light(block->params, &block->emitters, k);
+        LANES
+        for (int i = 0; i < (int)count; i++) {
+            uint path_class = load_class(state, i);
+            int shaded =
+                shaped_light_shades(&light, load_ray(state->shadows, BLOCK_STRIDE, i), limits[i]);
+            store_class(state, i, shaded ? path_class & ~CLASS_SHADOW : path_class);
+        }
+    }
+}
+#endif
+
 // Traces the shadow rays that paths ask for, and adds what they bring.
 STAGE void trace_shadows(const Block *block, const BlockRay *ray) {
     const uint count = ray->count;
+#ifdef SHAPED_LIGHTS
+    shade_by_lights(block, ray);
+#endif
 #ifdef CUTOUTS
     trace_shadows_through_cutouts(block, count);
     return;

@@ -46,9 +46,9 @@ INLINE uint crosses_boxes(const Change *change, uint box, Ray ray, float limit) 
     return crossed;
 }
 
-// 1 where a hit on the object is enough. `object` may be NO_INDEX.
+// 1 where a hit on the object is enough. `object` may be NO_INDEX, or have the flag LIGHT_HIT.
 INLINE uint is_changed(const Changes *changes, uint object) {
-    return changes->changed_objects[INDEX_OR_0(object)] & (uint)(object != NO_INDEX);
+    return changes->changed_objects[INDEX_OR_0(object)] & INDEX_MASK(object) & 1u;
 }
 
 // Notes of the path at `place` that it has met something that changed, if `met` is 1.
@@ -70,7 +70,11 @@ __kernel void touch_rays(LAUNCH_PARAMETERS, LIST_PARAMETERS, PATH_STATE_PARAMETE
     const State state = STATE_OF(params);
     const Changes changes = {CHANGES_ARGUMENTS};
     const Surface surface = load_surface(&state, path);
+#ifdef SHAPED_LIGHTS
+    const float limit = surface.distance; // also of those that end on a light
+#else
     const float limit = surface.object == NO_INDEX ? INFINITY : surface.distance;
+#endif
     const Ray ray = load_ray(rays, state.stride, path);
     touch(&changes, params.first_path + path,
           crosses_any_box(&changes.change, ray, limit) | is_changed(&changes, surface.object));

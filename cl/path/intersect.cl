@@ -1,20 +1,27 @@
 #include "path/coverage.cl"
 #include "path/map_normal.cl"
 #include "path/trace.cl"
+#include "path/shade_light.cl"
+
+#if defined(CUTOUTS) || defined(SHAPED_LIGHTS) || TEXTURED(NORMAL)
+#define NEEDS_SHADING
+#endif
 
 // Finds the nearest hit of each path's ray, and what the surface is like there. The hint keeps compilers from
 // making SIMD lanes of work-items, as Intel's would: the lanes are boxes and triangles.
 __kernel __attribute__((vec_type_hint(float8))) void intersect(LAUNCH_PARAMETERS, LIST_PARAMETERS,
                                                                GEOMETRY_PARAMETERS, SHADING_PARAMETERS,
-                                                               PATH_STATE_PARAMETERS) {
+                                                               EMITTERS_PARAMETERS, PATH_STATE_PARAMETERS) {
     if (get_global_id(0) >= lengths[length_place])
         return;
     const uint path = list[get_global_id(0)];
     const State state = STATE_OF(params);
     const Geometry geometry = {GEOMETRY_ARGUMENTS};
     RawHit hit;
-#ifdef CUTOUTS
+#ifdef NEEDS_SHADING
     const Shading shading = {SHADING_ARGUMENTS};
+#endif
+#ifdef CUTOUTS
     const Path p = load_path(&state, path);
     Ray ray = load_ray(rays, state.stride, path);
     float travelled = 0.0f;
@@ -30,6 +37,19 @@ __kernel __attribute__((vec_type_hint(float8))) void intersect(LAUNCH_PARAMETERS
 #else
     const bool met = trace_path(&geometry, &state, path, &hit);
 #endif
+#ifdef SHAPED_LIGHTS
+    const Emitters emitters = {EMITTERS_ARGUMENTS};
+    float distance = met ? hit.distance : INFINITY;
+    const uint light = nearest_light(&params, &emitters, &state, path, &distance);
+    surfaces[SURFACE_DISTANCE * state.stride + path] = distance;
+    if (light != NO_INDEX) {
+        shade_light_path(&params, &shading, &emitters, &state, path, params.first_path + path, light,
+                         distance);
+        store_bits(surfaces, SURFACE_OBJECT * state.stride + path, NO_INDEX);
+        store_class(&state, path, 0u);
+        return;
+    }
+#endif
     if (!met) {
         store_bits(surfaces, SURFACE_OBJECT * state.stride + path, NO_INDEX);
         store_class(&state, path, CLASS_MISS);
@@ -37,9 +57,6 @@ __kernel __attribute__((vec_type_hint(float8))) void intersect(LAUNCH_PARAMETERS
     }
     Surface surface = surface_at(&geometry, &hit);
 #if TEXTURED(NORMAL)
-#ifndef CUTOUTS
-    const Shading shading = {SHADING_ARGUMENTS};
-#endif
     map_normal(objects, &shading, &surface);
 #endif
     store_surface(&state, path, &surface);

@@ -1,4 +1,5 @@
 #include "path/state.cl"
+#include "path/shade_light.cl"
 #include "scene/light.cl"
 
 // Radiance from far away for a path whose ray left the scene, weighted against light sampling of the
@@ -29,5 +30,9 @@ __kernel void shade_miss(LAUNCH_PARAMETERS, LIST_PARAMETERS, SHADING_PARAMETERS,
     const Emitters emitters = {EMITTERS_ARGUMENTS};
     const WorkItem item = listed_path(&params, lengths[length_place], list);
     shade_miss_path(&params, &shading, &emitters, &state, item.path, item.result);
+#ifdef SHAPED_LIGHTS
+    for (uint light = 0u; light < params.sun_count; light++)
+        shade_sun_path(&params, &shading, &emitters, &state, item.path, item.result, light);
+#endif
 }
 #endif

@@ -1,17 +1,24 @@
 #include "path/coverage.cl"
 #include "path/trace.cl"
+#include "path/shade_light.cl"
 
 // Traces shadow rays, and adds the radiance of those that nothing is in the way of to what paths have
 // gathered. The hint keeps compilers from making SIMD lanes of work-items, as Intel's would: the lanes are
 // boxes and triangles.
-__kernel __attribute__((vec_type_hint(float8))) void trace_shadow(LAUNCH_PARAMETERS, LIST_PARAMETERS,
-                                                                  GEOMETRY_PARAMETERS, SHADING_PARAMETERS,
-                                                                  PATH_STATE_PARAMETERS) {
+__kernel __attribute__((vec_type_hint(float8))) void
+trace_shadow(LAUNCH_PARAMETERS, LIST_PARAMETERS, GEOMETRY_PARAMETERS, SHADING_PARAMETERS, EMITTERS_PARAMETERS,
+             PATH_STATE_PARAMETERS) {
     if (get_global_id(0) >= lengths[length_place])
         return;
     const uint path = list[get_global_id(0)];
     const State state = STATE_OF(params);
     const Geometry geometry = {GEOMETRY_ARGUMENTS};
+#ifdef SHAPED_LIGHTS
+    const Emitters emitters = {EMITTERS_ARGUMENTS};
+    if (any_light_shades(&params, &emitters, load_ray(shadows, state.stride, path),
+                         shadows[SHADOW_DISTANCE * state.stride + path]))
+        return;
+#endif
 #ifdef CUTOUTS
     const Shading shading = {SHADING_ARGUMENTS};
     const Path p = load_path(&state, path);

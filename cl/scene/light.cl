@@ -1,12 +1,15 @@
 #include "base/sampling.cl"
 #include "scene/light_sample.cl"
 #include "base/texture.cl"
+#ifdef SHAPED_LIGHTS
+#include "scene/shaped_light.cl"
+#endif
 
-// Emitters: triangles, and the environment. Which exist is known when a kernel is built
-// (ENVIRONMENT_IMAGE, TRIANGLE_LIGHTS), so that a scene does not pay for emitters that it does not have.
+// Emitters: triangles, lights that are objects of their own, and the environment. Which exist is known when a
+// kernel is built (ENVIRONMENT_IMAGE, TRIANGLE_LIGHTS, SHAPED_LIGHTS), so that a scene does not pay for emitters that it does not have.
 // A constant environment is left to BSDF sampling, which finds it without any variance of its own.
 
-#if defined(ENVIRONMENT_IMAGE) || defined(TRIANGLE_LIGHTS)
+#if defined(ENVIRONMENT_IMAGE) || defined(TRIANGLE_LIGHTS) || defined(SHAPED_LIGHTS)
 #define LIGHT_SAMPLING
 #endif
 
@@ -115,12 +118,6 @@ INLINE uint light_flags(const Params *params, const Emitters *emitters, uint lig
     return ((__global const uint *)emitters->lights)[LIGHT_FLAGS * params->light_count + light];
 }
 
-// Where a ray from a surface to a point starts: a step off the surface, on the side where the point lies.
-INLINE Vec3 start_towards(Vec3 point, Vec3 position, Vec3 step) {
-    float side = dot(subtract(point, position), step) < 0.0f ? -1.0f : 1.0f;
-    return along(position, side, step);
-}
-
 #if TEXTURED(EMISSION)
 // Where a point of a triangle lies in the texture of its emission, for both sets.
 INLINE Uvs light_uvs(__global const float *lights, uint stride, uint light, float b1, float b2) {
@@ -184,12 +181,63 @@ INLINE float second_choice(const Params *params, float choice) {
 }
 #endif
 
+#ifdef SHAPED_LIGHTS
+// The choice within a part of the choices, which begins at `first` and is `size` long.
+INLINE float choice_within(float choice, float first, float size) {
+    return CLAMP((choice - first) / MAX(size, 1e-20f), 0.0f, 0.99999994f);
+}
+
+INLINE float choice_among_shaped(const Params *params, float choice) {
+    return choice_within(choice, params->environment_probability, params->shaped_probability);
+}
+
+INLINE int is_choice_of_shaped(const Params *params, float choice) {
+    float first = params->environment_probability;
+    return (choice >= first) & (choice < first + params->shaped_probability);
+}
+
+INLINE float choice_among_triangles(const Params *params, float choice) {
+    float first = params->environment_probability + params->shaped_probability;
+    return choice_within(choice, first, 1.0f - first);
+}
+
+INLINE LightSample select_sample(int condition, LightSample a, LightSample b) {
+    LightSample result;
+    result.direction = select(condition, a.direction, b.direction);
+    result.distance = condition ? a.distance : b.distance;
+    result.radiance = select(condition, a.radiance, b.radiance);
+    result.pdf = condition ? a.pdf : b.pdf;
+    return result;
+}
+
+// The choices begin with those of the environment; then come lights that are objects of their own, and
+// triangles.
+INLINE LightSample sample_any_light(const Params *params, const Shading *shading, const Emitters *emitters,
+                                    Vec3 position, Vec3 step, Uniform2 uv, float choice) {
+    LightSample result = sample_shaped_light(params, emitters, position, step, uv,
+                                             choice_among_shaped(params, choice));
+#ifdef TRIANGLE_LIGHTS
+    LightSample triangle = sample_triangle_light(params, shading, emitters, position, step, uv,
+                                                 choice_among_triangles(params, choice));
+    result = select_sample(choice >= params->environment_probability + params->shaped_probability, triangle,
+                           result);
+#endif
+#ifdef ENVIRONMENT_IMAGE
+    LightSample far = sample_environment(params, emitters, uv);
+    result = select_sample(choice < params->environment_probability, far, result);
+#endif
+    return result;
+}
+#endif
+
 #ifdef LIGHT_SAMPLING
 // One direction towards a light, chosen by power among triangles and the environment.
 // `step` is how far off the surface at `position` rays start, along its normal.
 INLINE LightSample sample_light(const Params *params, const Shading *shading, const Emitters *emitters,
                                 Vec3 position, Vec3 step, Uniform2 uv, float choice) {
-#if defined(ENVIRONMENT_IMAGE) && defined(TRIANGLE_LIGHTS)
+#if defined(SHAPED_LIGHTS)
+    return sample_any_light(params, shading, emitters, position, step, uv, choice);
+#elif defined(ENVIRONMENT_IMAGE) && defined(TRIANGLE_LIGHTS)
     float p = params->environment_probability;
     int far = choice < p;
     LightSample a = sample_environment(params, emitters, uv);
@@ -211,7 +259,17 @@ INLINE LightSample sample_light(const Params *params, const Shading *shading, co
 
 // Whether `choice` leads to a light that differs between two scenes.
 INLINE uint chooses_changed_light(const Params *params, const Emitters *emitters, float choice) {
-#if defined(ENVIRONMENT_IMAGE) && defined(TRIANGLE_LIGHTS)
+#if defined(SHAPED_LIGHTS)
+    uint flags = shaped_flags(params, emitters,
+                              chosen_shaped_light(params, emitters, choice_among_shaped(params, choice)));
+    uint changed = ((flags & SHAPED_CHANGED) != 0u) & (uint)is_choice_of_shaped(params, choice);
+#ifdef TRIANGLE_LIGHTS
+    uint triangle = chosen_triangle(params, emitters, choice_among_triangles(params, choice));
+    uint is_triangle = choice >= params->environment_probability + params->shaped_probability;
+    changed |= is_triangle & ((light_flags(params, emitters, triangle) & LIGHT_CHANGED) != 0u);
+#endif
+    return changed;
+#elif defined(ENVIRONMENT_IMAGE) && defined(TRIANGLE_LIGHTS)
     uint near = choice >= params->environment_probability;
     uint light = chosen_triangle(params, emitters, second_choice(params, choice));
     return near & ((light_flags(params, emitters, light) & LIGHT_CHANGED) != 0u);

@@ -133,6 +133,7 @@ EMITTERS = Group(
     "Emitters",
     (
         _table("lights", "float", "LightPlane of params.light_count emissive triangles"),
+        _table("shaped_lights", "float", "ShapedPlane of params.shaped_count lights"),
         _table("environment_image", "float", "red, green and blue, row by row from +y"),
         _table("marginal", "float", "cumulative distribution of its rows, height + 1"),
         _table("conditional", "float", "of the pixels of each row, width + 1 each"),
@@ -490,12 +491,12 @@ BLOCK = (GEOMETRY, SHADING, EMITTERS, BRUTE_FORCE, BLOCK_MEMORY)
 KERNELS: dict[str, tuple[Group, ...]] = {
     "generate": (LAUNCH, SLOTS, PLACES, PATH_STATE),
     "compact": (LAUNCH, LIST, PATH_STATE, COMPACTION),
-    "intersect": (LAUNCH, LIST, GEOMETRY, SHADING, PATH_STATE),
+    "intersect": (LAUNCH, LIST, GEOMETRY, SHADING, EMITTERS, PATH_STATE),
     "sample_lights": (LAUNCH, LIST, SHADING, EMITTERS, PATH_STATE),
     "shade": (LAUNCH, LIST, SHADING, PATH_STATE),
     "shade_medium": (LAUNCH, LIST, SHADING, PATH_STATE, COUNTERS),
     "shade_miss": (LAUNCH, LIST, SHADING, EMITTERS, PATH_STATE),
-    "trace_shadow": (LAUNCH, LIST, GEOMETRY, SHADING, PATH_STATE),
+    "trace_shadow": (LAUNCH, LIST, GEOMETRY, SHADING, EMITTERS, PATH_STATE),
     "write_aovs": (LAUNCH, LIST, SHADING, PATH_STATE),
     "touch_rays": (LAUNCH, LIST, PATH_STATE, CHANGES),
     "touch_lights": (LAUNCH, LIST, SHADING, EMITTERS, PATH_STATE, CHANGES),

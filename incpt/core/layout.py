@@ -225,6 +225,63 @@ class LightFlag(IntFlag):
     CHANGED = 2
 
 
+LIGHT_HIT = 0x80000000
+"""Flag of RawHitPlane.OBJECT where a ray ends on a light, whose number are the other bits."""
+
+SURE_PDF = 1e12
+"""The density of a light sample that no ray could find in another way: so high that its weight is 1."""
+
+
+class ShapedPlane(IntEnum):
+    """Planes of the lights that are objects of their own (world space); their stride is their number. Suns
+    come first.
+
+    CENTER is where the light stands, X and Y are its axes, of unit length; it shines against the third one,
+    X x Y. HALF_X and HALF_Y are half its extent along them, for a ball both its radius. EMISSION is the
+    radiance, or for a light without a size its intensity, or irradiance for a sun. CAP is 1 - cos of the
+    angular radius of a sun. What is emitted falls off with the cosine of the angle to the axis, to 0 at
+    CONE_OUTER; CONE_SCALE is 1 over how much nearer to 1 that cosine is where it begins to. PROBABILITY is that of being chosen among all lights; ALIAS (uint) and ALIAS_PROBABILITY are the
+    table over these lights. FLAGS are of ShapedFlag (uint).
+    """
+
+    CENTER_X = 0
+    CENTER_Y = 1
+    CENTER_Z = 2
+    X_X = 3
+    X_Y = 4
+    X_Z = 5
+    Y_X = 6
+    Y_Y = 7
+    Y_Z = 8
+    HALF_X = 9
+    HALF_Y = 10
+    EMISSION_R = 11
+    EMISSION_G = 12
+    EMISSION_B = 13
+    CAP = 14
+    CONE_OUTER = 15
+    CONE_SCALE = 16
+    PROBABILITY = 17
+    ALIAS_PROBABILITY = 18
+    ALIAS = 19
+    FLAGS = 20
+
+
+class ShapedFlag(IntFlag):
+    """Properties of such a light. BALL, RECTANGLE, DISK or SUN is its shape. POINT: it has no size. HIDDEN:
+    camera rays do not meet it. SHADOWLESS: nothing is in the way of its light. CHANGED: as in LightFlag."""
+
+    DOUBLE_SIDED = 1
+    CHANGED = 2
+    BALL = 4
+    RECTANGLE = 8
+    DISK = 16
+    SUN = 32
+    POINT = 64
+    HIDDEN = 128
+    SHADOWLESS = 256
+
+
 class SamplePlane(IntEnum):
     """Planes of the path buffer: what each path of a step brings, in the order of the passes of a film.
 
@@ -691,6 +748,9 @@ PARAMS = _packed(
         ("multiple_scattering", np.float32),  # 1, or 0: light that scatters again on rough metal is lost
         ("light_count", np.uint32),
         ("environment_probability", np.float32),  # of sampling the environment instead of a triangle
+        ("shaped_count", np.uint32),  # lights that are objects of their own
+        ("sun_count", np.uint32),  # suns among them, which come first
+        ("shaped_probability", np.float32),  # of sampling one of them
         ("environment_color", np.float32, (3,)),  # radiance; times the image
         ("environment_width", np.uint32),
         ("environment_height", np.uint32),
@@ -782,6 +842,8 @@ def c_header() -> str:
         (ShadowPlane, "SHADOW"),
         (LightPlane, "LIGHT"),
         (LightFlag, "LIGHT"),
+        (ShapedPlane, "SHAPED"),
+        (ShapedFlag, "SHAPED"),
         (SamplePlane, "SAMPLE"),
         (PairPlane, "PAIR"),
         (CellSum, "CELL_SUM"),

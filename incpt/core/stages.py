@@ -23,9 +23,11 @@ class When(Flag):
     """Conditions of stages."""
 
     LIGHTS = auto()
-    """There are lights to sample: emissive triangles, or an image of the environment."""
+    """There are lights to sample: emissive triangles, lights of their own, or an image of the environment."""
     LAMPS = auto()
-    """There are emissive triangles among them."""
+    """Not only the environment is among them."""
+    SHAPED_LIGHTS = auto()
+    """There are lights that are objects of their own, which rays may meet."""
     MEDIA = auto()
     """There are materials that let light through."""
     AOVS = auto()
@@ -70,6 +72,8 @@ _TOUCHES_LIGHTS = When.CHANGES | When.LAMPS | When.CHANGED_LIGHTS
 STAGES = (
     Stage("intersect", "trace_rays", PathList.LIVE, sorts=(PathList.SURFACE, PathList.MISS, PathList.MEDIUM)),
     Stage("touch_rays", "touch_rays", PathList.LIVE, When.CHANGES),
+    # The kernel that finds the hit of a ray ends the path where it is one on a light.
+    Stage(None, "shade_lights", PathList.LIVE, When.SHAPED_LIGHTS),
     Stage("shade_miss", "shade_misses", PathList.MISS, When.SKY),
     Stage(None, "setup_surfaces", PathList.LIVE),
     Stage("write_aovs", "write_aovs", PathList.LIVE, When.AOVS | When.CAMERA_RAY),
@@ -88,10 +92,11 @@ STAGES = (
 )  # fmt: skip
 """All stages of a ray, in order. They lie between `generate`, which starts paths, and the next ray."""
 
-_BY_FEATURES = When.LIGHTS | When.LAMPS | When.MEDIA | When.AOVS | When.CHANGES
+_BY_FEATURES = When.LIGHTS | When.LAMPS | When.SHAPED_LIGHTS | When.MEDIA | When.AOVS | When.CHANGES
 _HOLDS = {
     "ENVIRONMENT_IMAGE": When.LIGHTS,
     "TRIANGLE_LIGHTS": When.LIGHTS | When.LAMPS,
+    "SHAPED_LIGHTS": When.LIGHTS | When.LAMPS | When.SHAPED_LIGHTS,
     "MEDIA": When.MEDIA | When.GOES_ON,
     "AOVS": When.AOVS,
     "CHANGES": When.CHANGES,

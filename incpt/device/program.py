@@ -33,6 +33,7 @@ FEATURES = {
     "PERTURBED_DIVISION": "Reciprocals of directions are two ulps off, for the tests of that slack.",
     "ENVIRONMENT_IMAGE": "The environment is an image, of which lights are sampled.",
     "TRIANGLE_LIGHTS": "There are emissive triangles, of which lights are sampled.",
+    "SHAPED_LIGHTS": "There are lights that are objects of their own.",
     "MEDIA": "There are materials that let light through.",
     "SMOOTH_MEDIA": "No material that lets light through is rough.",
     "CLEAR_MEDIA": "No material that lets light through absorbs any.",

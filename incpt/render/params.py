@@ -36,8 +36,11 @@ def launch_params(params: npt.NDArray[np.void], tables: SceneTables) -> npt.NDAr
     params, environment = params.copy(), tables.scene.environment
     params["last_ray"] = stages.last_ray(int(params["max_bounces"]), tables.has_media)
     params["camera_media"] = tables.camera_media
-    params["sees_sky"] = any(tables.environment_radiance)
+    shaped = tables.lights.shaped
+    params["sees_sky"] = any(tables.environment_radiance) or shaped.sun_count > 0
     params["light_count"] = tables.light_count
+    params["shaped_count"], params["sun_count"] = shaped.count, shaped.sun_count
+    params["shaped_probability"] = shaped.probability
     params["environment_probability"] = tables.environment_probability
     params["environment_color"] = tables.environment_radiance
     if environment.image is not None:

@@ -40,10 +40,11 @@ _PLANES = {
 }
 _CLASSES = {path_list: PathClass[path_list.name] for path_list in PathList}
 """Which paths are in which list."""
-_LIGHTS = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS")
+_LIGHTS = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS", "SHAPED_LIGHTS")
 _TEXTURES = ("TEXTURES", "VERTEX_COLORS")
 _FEATURES: Mapping[str | None, tuple[str, ...]] = {
-    "intersect": (*_TEXTURES, "CUTOUTS"),
+    "intersect": (*_TEXTURES, "CUTOUTS", "SHAPED_LIGHTS"),
+    "touch_rays": ("SHAPED_LIGHTS",),
     "shade_miss": (*_LIGHTS, "MEDIA"),
     "sample_lights": (*_LIGHTS, *_TEXTURES),
     "touch_lights": (*_LIGHTS, *_TEXTURES),
@@ -51,7 +52,7 @@ _FEATURES: Mapping[str | None, tuple[str, ...]] = {
     "shade": (*_LIGHTS, *_TEXTURES),
     "write_aovs": _TEXTURES,
     "first_hits": _TEXTURES,
-    "trace_shadow": (*_TEXTURES, "CUTOUTS"),
+    "trace_shadow": (*_TEXTURES, "CUTOUTS", "SHAPED_LIGHTS"),
 }
 """The features of a scene without which a kernel would leave something out. Those that would only make it
 quicker, as they do blocks, would be more variants to build."""
@@ -126,7 +127,7 @@ class Wavefront:
         chunk = self._chunk(batch, 0, 0)
         kernels = dict.fromkeys((one.kernel, one.features) for one in chunk.launches)
         # First hits need it too.
-        del kernels["intersect", _chosen(batch.features, _FEATURES["intersect"])]
+        kernels.pop(("intersect", _chosen(batch.features, _FEATURES["intersect"])), None)
         return [
             *self.idle_first_hits(batch),
             *self._idle(

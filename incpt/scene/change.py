@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import compress, count
 from operator import is_not
 
 from incpt.core.checks import require
+from incpt.scene.light import Light
 from incpt.scene.mesh import is_deformation
-from incpt.scene.model import Object, Scene
+from incpt.scene.model import Object, Placed, Scene
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,8 @@ class Change:
     deformed     objects whose mesh has other vertices or normals but the same faces
     reshaped     objects with another mesh
     reassigned   objects with another material
+    lights       lights that changed, came or went
+    far_lights   whether any of them shines from far away, as it is or as it was
     """
 
     camera: bool = False
@@ -39,16 +42,18 @@ class Change:
     deformed: frozenset[str] = frozenset()
     reshaped: frozenset[str] = frozenset()
     reassigned: frozenset[str] = frozenset()
+    lights: frozenset[str] = frozenset()
+    far_lights: bool = False
 
     @property
     def is_global(self) -> bool:
-        """Whether the whole image is affected alike: camera or environment."""
-        return self.camera or self.environment or self.environment_image
+        """Whether the whole image is affected alike: camera, environment, or light from far away."""
+        return self.camera or self.environment or self.environment_image or self.far_lights
 
     @property
     def is_local(self) -> bool:
         """Whether something in the scene changed that affects a part of the image most."""
-        return bool(self.materials or self.objects)
+        return bool(self.materials or self.objects or self.lights)
 
     @property
     def objects(self) -> frozenset[str]:
@@ -67,6 +72,7 @@ def diff(old: Scene, new: Scene) -> Change:
     common = [name for name in after if name in before and after[name] is not before[name]]
     pairs = [(name, before[name], after[name]) for name in common]
     old_image, new_image = old.environment.image, new.environment.image
+    lights = _changed_lights(old, new)
     return Change(
         camera=old.camera != new.camera,
         environment=old.environment != new.environment,
@@ -88,7 +94,22 @@ def diff(old: Scene, new: Scene) -> Change:
             name for name, a, b in pairs if a.mesh is not b.mesh and not is_deformation(a.mesh, b.mesh)
         ),
         reassigned=frozenset(name for name, a, b in pairs if a.material != b.material),
+        lights=frozenset(light.name for light in lights),
+        far_lights=any(light.is_far for light in lights),
     )
+
+
+def _changed_lights(old: Scene, new: Scene) -> list[Light]:
+    """Those that differ, as they were and as they are."""
+    if old.lights is new.lights or old.lights == new.lights:
+        return []
+    before, after = ({light.name: light for light in scene.lights} for scene in (old, new))
+    return [
+        light
+        for own, other in ((before, after), (after, before))
+        for name, light in own.items()
+        if other.get(name) != light
+    ]
 
 
 def _without_equal_ends(
@@ -106,13 +127,28 @@ def _without_equal_ends(
     return old[first : len(old) - last], new[first : len(new) - last]
 
 
-def affected_objects(old: Scene, new: Scene, change: Change) -> list[Object]:
-    """The objects that look different, as they were and as they are; hidden ones do not count, nor does one
-    that is there as before under another name, its own or its material's."""
+def affected_objects(old: Scene, new: Scene, change: Change) -> list[Placed]:
+    """The objects and lights that look different, as they were and as they are; hidden ones do not count, nor
+    does one that is there as before under another name, its own or its material's."""
     gone = _touched(old, change.objects - change.added, change.materials)
     come = _touched(new, change.objects - change.removed, change.materials)
     same = Counter(_look(old, o) for o in gone) & Counter(_look(new, o) for o in come)
-    return [*_without(old, gone, same), *_without(new, come, same)]
+    return [*_without(old, gone, same), *_without(new, come, same), *_affected_lights(old, new, change)]
+
+
+def _affected_lights(old: Scene, new: Scene, change: Change) -> list[Light]:
+    gone, come = (
+        [light for light in scene.lights if light.name in change.lights and light.visible]
+        for scene in (old, new)
+    )
+
+    def renamed(light: Light, others: list[Light]) -> bool:
+        return any(replace(other, name=light.name) == light for other in others)
+
+    return [
+        *(light for light in gone if not renamed(light, come)),
+        *(light for light in come if not renamed(light, gone)),
+    ]
 
 
 def _touched(scene: Scene, names: frozenset[str], materials: frozenset[str]) -> list[Object]:

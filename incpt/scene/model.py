@@ -24,6 +24,7 @@ from incpt.core.layout import MEDIUM_NONE
 from incpt.core.settings import RenderSettings
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
+from incpt.scene.light import Light, changed
 from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh
 from incpt.scene.transform import IDENTITY, Transform
@@ -101,16 +102,21 @@ class Object:
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
 
+Placed = Object | Light
+"""What stands in a scene under a name of its own."""
+
+
 @dataclass(frozen=True)
 class Scene:
-    """Everything that is seen: materials by name, and objects whose names differ. `settings` is the scene's
-    own proposal of how to render it. Raises InputError."""
+    """Everything that is seen: materials by name, and objects and lights whose names differ. `settings` is the
+    scene's own proposal of how to render it. Raises InputError."""
 
     camera: Camera = field(default_factory=Camera)
     environment: Environment = field(default_factory=Environment)
     materials: Mapping[str, Material] = field(default_factory=dict)
     objects: tuple[Object, ...] = ()
     settings: RenderSettings = RenderSettings()
+    lights: tuple[Light, ...] = ()
 
     def __post_init__(self) -> None:
         require("camera", self.camera, Camera, "a Camera")
@@ -123,6 +129,7 @@ class Scene:
             raise InputError(f"objects: {described(self.objects)} is not a list of Objects") from None
         object.__setattr__(self, "materials", MappingProxyType(materials))
         object.__setattr__(self, "objects", objects)
+        object.__setattr__(self, "lights", self._checked_lights())
         _require_all("materials", materials, str, "a name; name each by a text")
         _require_all("materials", materials.values(), Material, "a Material")
         if len(materials) >= MEDIUM_NONE:
@@ -134,6 +141,23 @@ class Scene:
             names, used = set(), set()
         if len(names) < len(objects) or not used <= materials.keys():
             self._complain_of_objects()
+        for light in self.lights:
+            if light.name in names:
+                raise InputError(f"lights: {light.name!r} is the name of an object too; rename one of them")
+
+    def _checked_lights(self) -> tuple[Light, ...]:
+        """`lights` as a tuple. Raises InputError."""
+        try:
+            lights = tuple(self.lights)
+        except TypeError:
+            raise InputError(f"lights: {described(self.lights)} is not a list of Lights") from None
+        _require_all("lights", lights, Light, "a Light")
+        seen: set[str] = set()
+        for light in lights:
+            if light.name in seen:
+                raise InputError(f"lights: two are named {light.name!r}; rename one of them")
+            seen.add(light.name)
+        return lights
 
     def _complain_of_objects(self) -> None:
         """Raises InputError for the first object that cannot be in the scene."""
@@ -159,6 +183,28 @@ class Scene:
         if not isinstance(name, str) or name not in self.object_index:
             raise InputError(f"object {described(name)} is not in the scene; {_known(self.object_index)}")
         return self.objects[self.object_index[name]]
+
+    @cached_property
+    def light_index(self) -> Mapping[str, int]:
+        """Place of each light in `lights`, by name."""
+        return {light.name: i for i, light in enumerate(self.lights)}
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Those of all objects and lights."""
+        return frozenset((*self.object_index, *self.light_index))
+
+    def light(self, name: str) -> Light:
+        """The light of that name. Raises InputError."""
+        if not isinstance(name, str) or name not in self.light_index:
+            raise InputError(f"light {described(name)} is not in the scene; {_known(self.light_index)}")
+        return self.lights[self.light_index[name]]
+
+    def placed(self, name: str) -> Object | Light:
+        """The object or the light of that name. Raises InputError."""
+        if isinstance(name, str) and name in self.light_index:
+            return self.light(name)
+        return self.object(name)
 
     def material(self, name: str) -> Material:
         """The material of that name. Raises InputError."""
@@ -195,10 +241,25 @@ class Scene:
         self.object(name)
         return replace(self, objects=tuple(o for o in self.objects if o.name != name))
 
+    def with_light(self, name: str, /, **changes: Any) -> Scene:
+        """A scene with one light changed: what Light takes, also where it stands, as for `with_object`. A
+        power, radiance or irradiance takes the place of the one that it has. Raises InputError."""
+        new = changed(self.light(name), changes)
+        return replace(self, lights=tuple(new if light.name == name else light for light in self.lights))
+
+    def with_added_light(self, *lights: Light) -> Scene:
+        """A scene with more lights."""
+        return replace(self, lights=(*self.lights, *lights))
+
+    def without_light(self, name: str) -> Scene:
+        """A scene without that light."""
+        self.light(name)
+        return replace(self, lights=tuple(light for light in self.lights if light.name != name))
+
     def __getstate__(self) -> dict[str, Any]:
         # A mappingproxy cannot be pickled or deep-copied.
         return {
-            **{k: v for k, v in self.__dict__.items() if k != "object_index"},
+            **{k: v for k, v in self.__dict__.items() if k not in ("object_index", "light_index")},
             "materials": dict(self.materials),
         }
 

@@ -11,7 +11,7 @@ import pyopencl as cl
 
 from incpt.device.device import Device
 from incpt.scene.image import Image
-from incpt.tables.lights import luminance
+from incpt.tables.alias import luminance
 
 
 @dataclass(frozen=True, eq=False)

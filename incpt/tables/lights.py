@@ -14,12 +14,19 @@ from incpt.core.layout import TextureSlot
 from incpt.device.device import Device
 from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
+from incpt.tables.alias import alias_table, luminance
 from incpt.tables.emitter_shares import corner_places, face_shares
+from incpt.tables.shaped_lights import (
+    NO_SHAPED_LIGHTS,
+    ShapedLights,
+    emissive_lights,
+    shaped_planes,
+    shares,
+    weight,
+)
 from incpt.tables.textures import TextureTables
 
 Array = npt.NDArray[np.float64]
-
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 SMALLEST_AREA = 1e-18
 """Square metres in world space from which on triangles are lights. In single precision a smaller one has no
@@ -30,11 +37,6 @@ _COORDINATE_ULPS, _EXTENT_ULPS, _TRANSFORM_ULPS, _TEST_ULPS = 8, 16, 10, 4
 distance at which a ray meets it, for the extent of the triangle."""
 SMALLEST_WEIGHT = float(np.finfo(np.float32).tiny)
 """The least `radiant_weight` of lights: in single precision less is black."""
-
-
-def luminance(color: npt.ArrayLike) -> Array:
-    """Rec. 709 luminance of linear colours (..., 3)."""
-    return np.asarray(np.asarray(color, np.float64) @ _LUMINANCE)
 
 
 def radiant_weight(material: Material) -> float:
@@ -68,12 +70,14 @@ class LightTables:
                              share of its face (`emitter_shares`). Others have 0: their points are left to
                              the rays that meet them
     environment_probability  the chance that light sampling turns to the environment's image
+    shaped                   the lights that are objects of their own
     """
 
     buffers: Mapping[str, cl.Buffer]
     count: int
     densities: Mapping[str, float]
     environment_probability: float
+    shaped: ShapedLights = NO_SHAPED_LIGHTS
 
     @classmethod
     def of(
@@ -83,20 +87,22 @@ class LightTables:
         has_image: bool,
         objects: tuple[Object, ...],
         is_textured: bool,
+        shaped: ShapedLights = NO_SHAPED_LIGHTS,
     ) -> LightTables:
-        """Those of triangles that were chosen with `share_of_triangles`; `has_image` tells whether the
-        environment has an image that shines. `objects` are those of the scene; `is_textured` tells whether
-        any material has a texture of emission."""
-        share = share_of_triangles(has_image) if triangles.count else 0.0
+        """Those of triangles that were chosen with `share_of_triangles`, or beside the lights `shaped` with
+        the share that is left; `has_image` tells whether the environment has an image that shines. `objects`
+        are those of the scene; `is_textured` tells whether any material has a texture of emission."""
+        share = share_of_triangles(has_image) if triangles.count or shaped.count else 0.0
         probability = 1.0 - share if has_image else 0.0
-        first, shares = _share_tables(triangles.shares, objects if is_textured else ())
+        first, of_faces = _share_tables(triangles.shares, objects if is_textured else ())
         planes = triangles.planes if is_textured else triangles.planes[: layout.LightPlane.TEXTURE]
         buffers = {
             "lights": device.upload(planes),
+            "shaped_lights": device.upload(shaped.planes),
             "first_share": device.upload(first),
-            "emitter_shares": device.upload(shares),
+            "emitter_shares": device.upload(of_faces),
         }
-        return cls(buffers, triangles.count, triangles.densities, probability)
+        return cls(buffers, triangles.count, triangles.densities, probability, shaped)
 
 
 def _share_tables(
@@ -113,8 +119,28 @@ def _share_tables(
 
 def light_tables(device: Device, scene: Scene, has_image: bool, textures: TextureTables) -> LightTables:
     """Those of a scene; `has_image` tells whether its environment has an image that shines."""
-    triangles = triangle_lights(scene, share_of_triangles(has_image), textures.emission_number)
-    return LightTables.of(device, triangles, has_image, scene.objects, textures.has(TextureSlot.EMISSION))
+    objects, number = scene.objects, textures.emission_number
+    is_textured = textures.has(TextureSlot.EMISSION)
+    lights = emissive_lights(scene)
+    if not lights:
+        triangles = triangle_lights(scene, share_of_triangles(has_image), number)
+        return LightTables.of(device, triangles, has_image, objects, is_textured)
+    chosen = shares(has_image, triangle_power(scene), [weight(light) for light in lights])
+    planes = shaped_planes(lights, chosen.lights, np.zeros(len(lights), np.bool_))
+    shaped = ShapedLights(planes, sum(light.is_far for light in lights), float(chosen.lights.sum()))
+    triangles = triangle_lights(scene, chosen.triangles, number)
+    return LightTables.of(device, triangles, has_image, objects, is_textured, shaped)
+
+
+def triangle_power(scene: Scene) -> float:
+    """What all emissive triangles together weigh beside lights that are objects of their own, W."""
+    found = 0.0
+    for obj in emissive_objects(scene):
+        material = scene.materials[obj.material]
+        area, each = areas(world_corners(obj)), radiant_weight(material) * face_shares(obj.mesh, material)
+        kept = (area >= SMALLEST_AREA) & (each >= SMALLEST_WEIGHT)
+        found += np.pi * float((each * area)[kept].sum())
+    return found
 
 
 def share_of_triangles(has_image: bool) -> float:
@@ -137,8 +163,8 @@ def triangle_lights(
     area = areas(corners)
     owner = np.repeat(np.arange(len(objects)), [len(obj.mesh.faces) for obj in objects])
     weights = np.array([radiant_weight(material) for material in materials])
-    shares = [face_shares(obj.mesh, material) for obj, material in zip(objects, materials, strict=True)]
-    share_of_face = np.concatenate(shares)
+    of_faces = [face_shares(obj.mesh, material) for obj, material in zip(objects, materials, strict=True)]
+    share_of_face = np.concatenate(of_faces)
     kept = (area >= SMALLEST_AREA) & (weights[owner] * share_of_face >= SMALLEST_WEIGHT)
     owner, share_of_face = owner[kept], share_of_face[kept]
     power = weights[owner] * share_of_face * area[kept]
@@ -158,7 +184,7 @@ def triangle_lights(
     return TriangleLights(
         planes,
         {objects[i].material: float(density[i]) for i in lit},
-        {obj.name: own for obj, own, number in zip(objects, shares, numbers, strict=True) if number},
+        {obj.name: own for obj, own, number in zip(objects, of_faces, numbers, strict=True) if number},
     )
 
 
@@ -247,22 +273,3 @@ def emissive_objects(scene: Scene) -> list[Object]:
     """Those that are seen. They are few as a rule, and looking for them must be quick among thousands."""
     emissive = {name for name, material in scene.materials.items() if material.is_emissive}
     return [obj for obj in scene.objects if obj.material in emissive and obj.visible]
-
-
-def alias_table(
-    weights: npt.NDArray[np.floating],
-) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.uint32]]:
-    """Walker's alias table by Vose's method (1991): cell i stands for i with probability[i], else for
-    alias[i]."""
-    count = len(weights)
-    scaled = (np.asarray(weights, np.float64) * (count / np.sum(weights))).tolist()
-    probability, alias = np.ones(count, np.float32), np.arange(count, dtype=np.uint32)
-    small = [i for i, w in enumerate(scaled) if w < 1.0]
-    large = [i for i, w in enumerate(scaled) if w >= 1.0]
-    while small and large:
-        i, j = small.pop(), large[-1]
-        probability[i], alias[i] = scaled[i], j
-        scaled[j] -= 1.0 - scaled[i]
-        if scaled[j] < 1.0:
-            small.append(large.pop())
-    return probability, alias

@@ -76,7 +76,11 @@ class SceneTables:
     @cached_property
     def features(self) -> tuple[str, ...]:
         """The preprocessor names that choose a variant of the shading kernels."""
-        names = {"ENVIRONMENT_IMAGE": self._has_image_light, "TRIANGLE_LIGHTS": self.light_count > 0}
+        names = {
+            "ENVIRONMENT_IMAGE": self._has_image_light,
+            "TRIANGLE_LIGHTS": self.light_count > 0,
+            "SHAPED_LIGHTS": self.lights.shaped.count > 0,
+        }
         return tuple(name for name, holds in names.items() if holds)
 
     @property
@@ -268,7 +272,7 @@ def _objects_changed(change: Change) -> bool:
 def _emission_changed(change: Change) -> bool:
     # Whatever may touch an emissive triangle; cheap where there are few of them.
     return bool(change.objects or change.reordered or change.environment or change.environment_image
-                or _materials_changed(change))  # fmt: skip
+                or change.lights or _materials_changed(change))  # fmt: skip
 
 
 def _materials_changed(change: Change) -> bool:
