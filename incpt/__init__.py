@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from incpt.scene.change import Change as Change, diff as diff
     from incpt.scene.environment import Environment as Environment
     from incpt.scene.image import Image as Image
+    from incpt.scene.light import Light as Light
     from incpt.scene.material import Material as Material
     from incpt.scene.mesh import Mesh as Mesh, MeshSource as MeshSource
     from incpt.scene.model import Object as Object, Scene as Scene
@@ -56,6 +57,7 @@ _HOMES = {
     "Image": "scene.image",
     "InputError": "core.errors",
     "InputWarning": "core.errors",
+    "Light": "scene.light",
     "Material": "scene.material",
     "Mesh": "scene.mesh",
     "MeshSource": "scene.mesh",

@@ -54,6 +54,7 @@ RIGHT: Mapping[str, Mapping[str, Any]] = {
     "Texture": {"bitmap": incpt.Bitmap(np.ones((2, 4, 3)))},
     "load_bitmap": {"path": "a.png"},
     "Object": {"name": "a", "mesh": incpt.shape("cube"), "material": "red"},
+    "Light": {"name": "a", "kind": "point"},
     "Camera.image_plane": {"aspect": 2.0},
     "Camera.project": {"points": np.eye(3), "aspect": 2.0},
     "Session": {"scene": SCENE},
@@ -65,7 +66,10 @@ RIGHT: Mapping[str, Mapping[str, Any]] = {
     "Session.pick": {"pixel": (3, 3)},
     "Session.pick_point": {"point": (0.5, 0.5)},
     "Scene.object": {"name": "red cube"},
+    "Scene.light": {"name": "lamp"},
+    "Scene.placed": {"name": "red cube"},
     "Scene.material": {"name": "red"},
+    "Scene.without_light": {"name": "lamp"},
     "Scene.without_object": {"name": "red cube"},
     "Transform.from_matrix": {"matrix": np.eye(4)},
     "Transform.moved_to": {"matrix": np.eye(4)},
@@ -83,7 +87,7 @@ RIGHT: Mapping[str, Mapping[str, Any]] = {
 WORDS = {
     "choice": ("device", "--device"), "device": ("device", "--device"), "layers": ("layers", "layer "),
     "linear": ("image",), "pixels": ("pixels", "image"),
-    "name": ("name", "object ", "material ", "shape ", "pass "),
+    "name": ("name", "object ", "light ", "material ", "shape ", "pass "),
 }  # fmt: skip
 """How messages begin, where not with the argument's name."""
 MADE_BY_INCPT = {"Change", "FirstHits", "Mode", "Snapshot", "StepReport"}
@@ -179,6 +183,9 @@ EXAMPLES: list[tuple[str, Callable[[], object]]] = [
     ("image: 'a' is not an Image; load_image() reads one", lambda: SCENE.with_environment(image="a")),
     ("mesh: an array of shape (4, 4, 3) is not a Mesh; use ", lambda: incpt.Object("a", ARRAY, "red")),
     ("name: None is not a name; give the object a text", lambda: incpt.Object(None, CUBE, "red")),
+    ("lights: ['sun'] is not a Light", lambda: incpt.Scene(lights=[["sun"]])),
+    ("power: an array of shape (4, 4, 3) is not a number", lambda: incpt.Light("a", "spot", power=ARRAY)),
+    ("kind: 5 is not known; choose one of point, spot, sun, ", lambda: incpt.Light("a", 5)),
     ("vertices: 'cube' is not an array of numbers", lambda: incpt.Mesh("cube", [[0, 1, 2]])),
     ("faces: hold a number that is not whole, or beyond ", lambda: incpt.Mesh(np.eye(3), [[0, 1, 1.5]])),
     ("faces: hold a number that is not whole, or beyond ", lambda: incpt.Mesh(np.eye(3), [[0, 1, 2**32]])),

@@ -417,8 +417,7 @@ STAGE void shade_by_lights(const Block *block, const BlockRay *ray) {
         LANES
         for (int i = 0; i < (int)count; i++) {
             uint path_class = load_class(state, i);
-            int shaded =
-                shaped_light_shades(&light, load_ray(state->shadows, BLOCK_STRIDE, i), limits[i]);
+            int shaded = shaped_light_shades(&light, load_ray(state->shadows, BLOCK_STRIDE, i), limits[i]);
             store_class(state, i, shaded ? path_class & ~CLASS_SHADOW : path_class);
         }
     }

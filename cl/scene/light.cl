@@ -6,8 +6,9 @@
 #endif
 
 // Emitters: triangles, lights that are objects of their own, and the environment. Which exist is known when a
-// kernel is built (ENVIRONMENT_IMAGE, TRIANGLE_LIGHTS, SHAPED_LIGHTS), so that a scene does not pay for emitters that it does not have.
-// A constant environment is left to BSDF sampling, which finds it without any variance of its own.
+// kernel is built (ENVIRONMENT_IMAGE, TRIANGLE_LIGHTS, SHAPED_LIGHTS), so that a scene does not pay for
+// emitters that it does not have. A constant environment is left to BSDF sampling, which finds it without any
+// variance of its own.
 
 #if defined(ENVIRONMENT_IMAGE) || defined(TRIANGLE_LIGHTS) || defined(SHAPED_LIGHTS)
 #define LIGHT_SAMPLING
@@ -214,8 +215,8 @@ INLINE LightSample select_sample(int condition, LightSample a, LightSample b) {
 // triangles.
 INLINE LightSample sample_any_light(const Params *params, const Shading *shading, const Emitters *emitters,
                                     Vec3 position, Vec3 step, Uniform2 uv, float choice) {
-    LightSample result = sample_shaped_light(params, emitters, position, step, uv,
-                                             choice_among_shaped(params, choice));
+    LightSample result =
+        sample_shaped_light(params, emitters, position, step, uv, choice_among_shaped(params, choice));
 #ifdef TRIANGLE_LIGHTS
     LightSample triangle = sample_triangle_light(params, shading, emitters, position, step, uv,
                                                  choice_among_triangles(params, choice));

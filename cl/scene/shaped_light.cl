@@ -2,12 +2,12 @@
 #include "scene/light_sample.cl"
 
 // Lights that are objects of their own: balls, rectangles, disks and suns; see layout.ShapedPlane. They are
-// chosen by `sample_shaped_light`, and met by rays. A ray that meets the shining side of one ends there, as on
-// a surface that reflects nothing; from behind, or from inside of a ball, lights are not there.
+// chosen by `sample_shaped_light`, and met by rays. A ray that meets the shining side of one ends there, as
+// on a surface that reflects nothing; from behind, or from inside of a ball, lights are not there.
 //
-// Directions are chosen by solid angle: suns and balls within the cone that they fill, rectangles by C. Ureña,
-// M. Fajardo and A. King, An Area-Preserving Parametrization for Spherical Rectangles, EGSR 2013. Points on
-// disks, and on rectangles that are seen under a small angle, are chosen by area.
+// Directions are chosen by solid angle: suns and balls within the cone that they fill, rectangles by C.
+// Ureña, M. Fajardo and A. King, An Area-Preserving Parametrization for Spherical Rectangles, EGSR 2013.
+// Points on disks, and on rectangles that are seen under a small angle, are chosen by area.
 
 typedef struct {
     uint flags; // ShapedFlag
@@ -63,8 +63,8 @@ INLINE Vec3 shaped_emission(const ShapedLight *light, Vec3 direction) {
     return scale(t * t * (3.0f - 2.0f * t), light->emission);
 }
 
-// How high a cap of the unit sphere a ball fills, 1 - cos of its angular radius, from `squared` metres squared
-// away from its centre; 2 from inside.
+// How high a cap of the unit sphere a ball fills, 1 - cos of its angular radius, from `squared` metres
+// squared away from its centre; 2 from inside.
 INLINE float cap_of_ball(float radius, float squared) {
     float share = radius * radius / MAX(squared, 1e-37f);
     return share < 1.0f ? share / (1.0f + SQRT(1.0f - MIN(share, 1.0f))) : 2.0f;
@@ -149,7 +149,7 @@ INLINE float shaped_light_pdf(const ShapedLight *light, Vec3 to_center, Vec3 dir
 }
 
 // Of a distance to a light, by how much surfaces in its own plane count as behind it.
-#define LIGHT_AHEAD 4e-6f
+#define LIGHT_AHEAD 1e-6f
 
 // `choice` selects the light, `uv` the direction. Where only light sampling can find the light, its weight is
 // made 1 by SURE_PDF.
@@ -168,8 +168,7 @@ INLINE LightSample sample_shaped_light(const Params *params, const Emitters *emi
     float height = uv.u * cap, sine, cosine;
     sincos_turns(uv.v, &sine, &cosine);
     float aside = SQRT(MAX(height * (2.0f - height), 0.0f));
-    Vec3 in_cone =
-        from_local(frame_of(center_direction), vec3(aside * cosine, aside * sine, 1.0f - height));
+    Vec3 in_cone = from_local(frame_of(center_direction), vec3(aside * cosine, aside * sine, 1.0f - height));
     int round = sun | ball;
     float chord = SQRT(MAX(light.half_x * light.half_x - squared * aside * aside, 0.0f));
     float round_distance = point ? length : MAX(length * (1.0f - height) - chord, 0.0f);
@@ -181,7 +180,9 @@ INLINE LightSample sample_shaped_light(const Params *params, const Emitters *emi
     Uniform2 chosen = sample_seen_rectangle(&seen, MAX(solid_angle, LEAST_SOLID_ANGLE), uv);
     int disk = has_flag(&light, SHAPED_DISK);
     float radius = SQRT(uv.u);
-    float a = disk ? light.half_x * radius * cosine : by_angle ? chosen.u : light.half_x * (2.0f * uv.u - 1.0f);
+    float a = disk       ? light.half_x * radius * cosine
+              : by_angle ? chosen.u
+                         : light.half_x * (2.0f * uv.u - 1.0f);
     float b = disk ? light.half_y * radius * sine : by_angle ? chosen.v : light.half_y * (2.0f * uv.v - 1.0f);
     Vec3 to_point = add(to_center, add(scale(a, light.x), scale(b, light.y)));
     float flat_squared = dot(to_point, to_point), flat_distance = SQRT(flat_squared);

@@ -240,8 +240,9 @@ class ShapedPlane(IntEnum):
     X x Y. HALF_X and HALF_Y are half its extent along them, for a ball both its radius. EMISSION is the
     radiance, or for a light without a size its intensity, or irradiance for a sun. CAP is 1 - cos of the
     angular radius of a sun. What is emitted falls off with the cosine of the angle to the axis, to 0 at
-    CONE_OUTER; CONE_SCALE is 1 over how much nearer to 1 that cosine is where it begins to. PROBABILITY is that of being chosen among all lights; ALIAS (uint) and ALIAS_PROBABILITY are the
-    table over these lights. FLAGS are of ShapedFlag (uint).
+    CONE_OUTER; CONE_SCALE is 1 over how much nearer to 1 that cosine is where it begins to. PROBABILITY is
+    that of being chosen among all lights; ALIAS (uint) and ALIAS_PROBABILITY are the table over these lights.
+    FLAGS are of ShapedFlag (uint).
     """
 
     CENTER_X = 0

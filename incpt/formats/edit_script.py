@@ -7,7 +7,7 @@ cumulative = true           # each edit on top of the one before; false: each on
 [[edits]]
 name = "rotate red cube"    # optional label
 step = 0                    # rendering step, after the base picture, at which the edit happens
-object = "red cube"         # or material = "red", camera = true, environment = true
+object = "red cube"         # or material = "red", light = "lamp", camera = true, environment = true
 rotation = [0, 30, 35]      # the new values, with the keys of the scene file
 pixel = [480, 270]          # optional: the point of change, for point_of_change = "pixel"
 capture = [0, 30]           # optional: instead of the file's
@@ -30,6 +30,7 @@ from incpt.formats.mesh_library import MeshLibrary
 from incpt.formats.scene_toml import (
     CAMERA_KEYS,
     ENVIRONMENT_KEYS,
+    LIGHT_KEYS,
     MATERIAL_KEYS,
     MESH_KEYS,
     PLACEMENT_KEYS,
@@ -37,7 +38,7 @@ from incpt.formats.scene_toml import (
 from incpt.formats.toml_kit import check_keys, quoted, read_toml, text_of
 from incpt.scene.model import Scene
 
-KINDS = ("object", "material", "camera", "environment")
+KINDS = ("object", "material", "light", "camera", "environment")
 DEFAULT_CAPTURE = (0, 2, 5, 10)
 MAX_STEP = 10_000_000
 
@@ -46,6 +47,7 @@ _EDIT_KEYS = ("name", "step", "pixel", "capture")
 _VALUE_KEYS: dict[str, tuple[str, ...]] = {
     "object": (*PLACEMENT_KEYS, "material", *MESH_KEYS),
     "material": MATERIAL_KEYS,
+    "light": LIGHT_KEYS,
     "camera": CAMERA_KEYS,
     "environment": ENVIRONMENT_KEYS,
 }
@@ -78,6 +80,8 @@ class Edit:
         if self.kind == "material":
             scene.material(self.name)
             return scene.with_material(self.name, **self.changes)
+        if self.kind == "light":
+            return scene.with_light(self.name, **self.changes)
         return scene.with_object(self.name, **self.changes)
 
 
@@ -172,7 +176,7 @@ def _target(table: dict[str, Any]) -> tuple[str, str | None, dict[str, Any]]:
         raise InputError(f"{found}; give one of {', '.join(KINDS)}")
     kind = kinds[0]
     values = {key: value for key, value in table.items() if key not in _EDIT_KEYS and key != kind}
-    if kind in ("object", "material"):
+    if kind in ("object", "material", "light"):
         return kind, text_of(table, kind, f"name the {kind}"), values
     if table[kind] is not True:
         raise InputError(f"{kind}: {table[kind]!r} is not true; write {kind} = true and its new values below")

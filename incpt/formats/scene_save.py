@@ -19,10 +19,12 @@ from incpt.formats.scene_toml import CAMERA_KEYS, VERSION
 from incpt.formats.textures import texture_value
 from incpt.scene.environment import Environment
 from incpt.scene.image import Image
+from incpt.scene.light import STRENGTHS, Light
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
 from incpt.scene.texture import Bitmap, Texture
+from incpt.scene.transform import Transform
 
 
 def save(scene: Scene, path: str | os.PathLike[str]) -> None:
@@ -167,6 +169,8 @@ def _document(scene: Scene, beside: _Beside) -> str:
         }
     if scene.objects:
         document["objects"] = [_object_table(obj, beside) for obj in scene.objects]
+    if scene.lights:
+        document["lights"] = [_light_table(light) for light in scene.lights]
     try:
         return tomlkit.dumps(document)
     except TOMLKitError as error:
@@ -186,12 +190,28 @@ def _environment_table(environment: Environment, beside: _Beside) -> dict[str, A
 
 def _object_table(obj: Object, beside: _Beside) -> dict[str, Any]:
     table: dict[str, Any] = {"name": obj.name, **beside.mesh(obj.mesh, obj.name), "material": obj.material}
-    names = ("position", "rotation", "scale") if obj.transform.matrix is None else ("matrix",)
-    for name in names:
-        table[name] = _toml(getattr(obj.transform, name))
+    table |= _placement(obj.transform)
     if not obj.visible:
         table["visible"] = False
     return table
+
+
+def _light_table(light: Light) -> dict[str, Any]:
+    strength, value = light.strength
+    table: dict[str, Any] = {"name": light.name, "kind": light.kind, **_placement(light.transform)}
+    table |= {"color": _toml(light.color), strength: value}
+    default = Light(light.name, light.kind)
+    kept = (*table, *STRENGTHS, "transform")
+    return table | {
+        field.name: _toml(getattr(light, field.name))
+        for field in fields(light)
+        if field.name not in kept and getattr(light, field.name) != getattr(default, field.name)
+    }
+
+
+def _placement(transform: Transform) -> dict[str, Any]:
+    names = ("position", "rotation", "scale") if transform.matrix is None else ("matrix",)
+    return {name: _toml(getattr(transform, name)) for name in names}
 
 
 def _changed(owner: Any, beside: _Beside) -> dict[str, Any]:

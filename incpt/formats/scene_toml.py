@@ -20,6 +20,7 @@ from incpt.formats.mesh_library import MeshLibrary
 from incpt.formats.toml_kit import check_keys, quoted, read_toml, table_of, text_of
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
+from incpt.scene.light import KINDS, Light
 from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
 
@@ -27,12 +28,16 @@ _T = TypeVar("_T")
 VERSION = 2
 """That is written."""
 _READ = (1, 2)
-_TABLES = ("version", "camera", "environment", "render", "materials", "objects")
+_TABLES = ("version", "camera", "environment", "render", "materials", "objects", "lights")
 CAMERA_KEYS = tuple(field.name for field in fields(Camera))
 ENVIRONMENT_KEYS = tuple(field.name for field in fields(Environment))
 MATERIAL_KEYS = tuple(field.name for field in fields(Material))
 PLACEMENT_KEYS = ("position", "rotation", "scale", "matrix", "visible")
 MESH_KEYS = ("shape", "mesh", "part")
+LIGHT_KEYS = (
+    *(field.name for field in fields(Light) if field.name not in ("name", "transform", "visible")),
+    *PLACEMENT_KEYS,
+)
 _OBJECT_KEYS = ("name", *MESH_KEYS, "material", *PLACEMENT_KEYS)
 
 
@@ -49,7 +54,8 @@ def load_scene_toml(path: Path) -> Scene:
         settings = _built(RenderSettings, table_of(tables, "render"), RenderSettings.names())
     materials = _materials(table_of(tables, "materials"), path.parent)
     objects = _objects(tables.get("objects", []), materials, path.parent)
-    return Scene(camera, environment, materials, tuple(objects), settings)
+    lights = _lights(tables.get("lights", []))
+    return Scene(camera, environment, materials, tuple(objects), settings, tuple(lights))
 
 
 def _check_version(tables: Mapping[str, Any]) -> None:
@@ -106,6 +112,23 @@ def _objects(tables: Any, materials: Mapping[str, Material], folder: Path) -> li
                 numbers[obj.name] = number
                 objects.append(obj)
     return objects
+
+
+def _lights(tables: Any) -> list[Light]:
+    if not isinstance(tables, list):
+        raise InputError("lights: is one table; write [[lights]] with double brackets")
+    lights = []
+    for number, table in enumerate(tables, 1):
+        label = table.get("name") if isinstance(table, dict) else None
+        shown = f" ({quoted(label)})" if isinstance(label, str) and label else ""
+        with in_place(f"[[lights]] {number}{shown}"):
+            if not isinstance(table, dict):
+                raise InputError("is not a table; write [[lights]] and its keys below")
+            check_keys(table, ("name", *LIGHT_KEYS))
+            text_of(table, "name", "give every light a name of its own")
+            text_of(table, "kind", f"choose one of {', '.join(KINDS)}")
+            lights.append(Light(**table))
+    return lights
 
 
 def _object(table: dict[str, Any], materials: Mapping[str, Material], library: MeshLibrary) -> list[Object]:

@@ -21,7 +21,7 @@ from incpt.render.strategies import strategy_of
 from incpt.render.strategy import Measurements, Situation
 from incpt.render.tiles import BoolArray, IntArray, TileGrid
 from incpt.scene.change import Change, affected_objects, diff
-from incpt.scene.model import Object, Scene
+from incpt.scene.model import Placed, Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +134,7 @@ class Progress:
         self,
         old: Scene,
         scene: Scene,
-        changed: tuple[Object, ...],
+        changed: tuple[Placed, ...],
         film: Measurements,
         pixel: tuple[float, float] | None,
     ) -> Progress:
@@ -158,7 +158,7 @@ class Progress:
             return other.entering(Mode.REFINE, scene, film)
         return replace(other, anchor=anchor).entering(Mode.INCREMENTAL, scene, film, affected, pixel)
 
-    def _stale_after(self, scene: Scene, changed: tuple[Object, ...]) -> BoolArray | None:
+    def _stale_after(self, scene: Scene, changed: tuple[Placed, ...]) -> BoolArray | None:
         """`stale` after an edit that affects the objects `changed`: auxiliary images show something else
         where these are seen, and nowhere else."""
         if not self.settings.aovs:
@@ -209,7 +209,7 @@ class Progress:
         mode: Mode,
         scene: Scene,
         film: Measurements,
-        affected: tuple[Object, ...] = (),
+        affected: tuple[Placed, ...] = (),
         pixel: tuple[float, float] | None = None,
         order: IntArray | None = None,
     ) -> Progress:
@@ -241,7 +241,7 @@ class Progress:
         return next_mode(self.mode, event, strategy_of(self.settings))
 
 
-def _affected_locally(since: Scene, scene: Scene) -> tuple[Object, ...]:
+def _affected_locally(since: Scene, scene: Scene) -> tuple[Placed, ...]:
     """What looks different since a scene; nothing where everything does."""
     change = diff(since, scene)
     return () if change.is_global else tuple(affected_objects(since, scene, change))

@@ -17,7 +17,7 @@ from incpt.render.plan import Cursor, Queue
 from incpt.render.strategy import Situation, Strategy
 from incpt.render.tiles import NO_TILES, IntArray
 from incpt.scene.camera import Camera
-from incpt.scene.model import Object
+from incpt.scene.model import Placed
 
 
 class Restart(Strategy):
@@ -138,7 +138,7 @@ def passes_of(settings: RenderSettings) -> tuple[FilmPass, ...]:
 
 
 def point_of_change(
-    camera: Camera, objects: tuple[Object, ...], width: int, height: int
+    camera: Camera, objects: tuple[Placed, ...], width: int, height: int
 ) -> tuple[float, float]:
     """The centre of the 2D bounding box of objects, of its visible part where there is one, in pixels of a
     picture of that size; the centre of the picture where there are none in front of the camera."""

@@ -36,7 +36,7 @@ from incpt.render.modes import Mode
 from incpt.render.plan import CountArray, Cursor, Plan, Queue
 from incpt.render.tiles import BoolArray, IntArray, TileGrid
 from incpt.render.tracer import Tracer
-from incpt.scene.model import Object, Scene
+from incpt.scene.model import Placed, Scene
 
 
 class Measurements(Protocol):
@@ -77,7 +77,7 @@ class Situation:
     scene: Scene
     tile_spp: CountArray
     film: Measurements
-    affected: tuple[Object, ...] = ()
+    affected: tuple[Placed, ...] = ()
     pixel: tuple[float, float] | None = None
     queue: Queue | None = None
     drawn: CountArray | None = None

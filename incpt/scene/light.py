@@ -28,6 +28,8 @@ STRENGTHS = ("power", "radiance", "irradiance")
 """The quantities of which one says how much a light emits."""
 SMALLEST_SIZE = 1e-7
 """Metres below which a light has no size: a point, from which no ray comes but towards a known place."""
+SMALLEST_ANGLE = 1e-4
+"""Degrees below which a sun has no size."""
 LARGEST_STRENGTH = 1e12
 """Bound on watts, radiance and irradiance."""
 
@@ -59,8 +61,8 @@ class Light:
     color           linear, a factor of the strength.
     power           radiant power in all directions together, watt
     radiance        of its surface, W / (m² sr)
-    irradiance      of a sun, on a surface that faces it, W / m². One of these three is given: others are None.
-                    Without any a sun has an irradiance of 3, other lights a power of 100.
+    irradiance      of a sun, on a surface that faces it, W / m². One of these three is given, and the others
+                    are None. Without any a sun has an irradiance of 3, other lights a power of 100.
     radius          metres; 0 is a point
     size            (width, height) of a rectangle, metres
     angle           diameter of a sun as it is seen, degrees; 0 is a point
@@ -168,11 +170,6 @@ class Light:
         name = next(name for name in STRENGTHS if getattr(self, name) is not None)
         return name, getattr(self, name)
 
-    def with_strength(self, name: str, value: float) -> Light:
-        """The light with one of STRENGTHS in place of the one that it has. Raises InputError."""
-        one_of("strength", name, STRENGTHS)
-        return replace(self, **{key: value if key == name else None for key in STRENGTHS})
-
     @property
     def position(self) -> Vector:
         """In world space, metres. That of a sun says nothing."""
@@ -196,7 +193,9 @@ class Light:
     @property
     def has_size(self) -> bool:
         """Whether rays can meet it."""
-        return self.angle > 0 if self.kind == "sun" else max(self.half_size) >= SMALLEST_SIZE
+        if self.is_far:
+            return self.angle >= SMALLEST_ANGLE
+        return self.kind in ("rectangle", "disk") or self.radius >= SMALLEST_SIZE
 
     @cached_property
     def axes(self) -> npt.NDArray[np.float64]:
@@ -205,16 +204,17 @@ class Light:
 
     @property
     def half_size(self) -> tuple[float, float]:
-        """Half of its extent along x and y, metres: for a ball its radius. (0, 0) for a sun."""
-        x, y, z = (abs(s) for s in self.transform.scale)
-        if self.kind == "sun":
+        """Half of its extent along x and y, metres: for a ball its radius; 0 without a size."""
+        if self.is_far or not self.has_size:
             return 0.0, 0.0
+        x, y, z = (abs(s) for s in self.transform.scale)
         if self.kind == "rectangle":
-            return 0.5 * x * self.size[0], 0.5 * y * self.size[1]
-        if self.kind == "disk":
-            return x * self.radius, y * self.radius
-        radius = (x * y * z) ** (1 / 3) * self.radius
-        return radius, radius
+            half = 0.5 * x * self.size[0], 0.5 * y * self.size[1]
+        elif self.kind == "disk":
+            half = x * self.radius, y * self.radius
+        else:
+            half = 2 * ((x * y * z) ** (1 / 3) * self.radius,)
+        return max(half[0], SMALLEST_SIZE), max(half[1], SMALLEST_SIZE)
 
     @property
     def area(self) -> float:
@@ -252,7 +252,7 @@ class Light:
         """How large it is as seen from where it is brightest, square metres: intensity over radiance. Of a
         sun irradiance over radiance."""
         if self.kind == "sun":
-            return math.pi * math.sin(math.radians(min(self.angle, 180.0)) / 2) ** 2
+            return math.pi * math.sin(math.radians(self.angle) / 2) ** 2
         return self.area if self.kind in ("rectangle", "disk") else self.area / 4
 
     @property
@@ -302,8 +302,8 @@ def changed(light: Light, changes: dict[str, Any]) -> Light:
     values = dict(changes)
     given = [name for name in STRENGTHS if values.get(name) is not None]
     if given:
-        values = {name: None for name in STRENGTHS} | values
+        values = dict.fromkeys(STRENGTHS) | values
     kind = values.get("kind", light.kind)
     if not given and kind in KINDS and (kind == "sun") != light.is_far:
-        values |= {name: None for name in STRENGTHS}
+        values |= dict.fromkeys(STRENGTHS)
     return replace(light, **values)

@@ -108,8 +108,8 @@ Placed = Object | Light
 
 @dataclass(frozen=True)
 class Scene:
-    """Everything that is seen: materials by name, and objects and lights whose names differ. `settings` is the
-    scene's own proposal of how to render it. Raises InputError."""
+    """Everything that is seen: materials by name, and objects and lights whose names differ. `settings` is
+    the scene's own proposal of how to render it. Raises InputError."""
 
     camera: Camera = field(default_factory=Camera)
     environment: Environment = field(default_factory=Environment)

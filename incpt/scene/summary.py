@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Collection
 
 import numpy as np
 
 from incpt.scene.environment import Environment
+from incpt.scene.light import KINDS
 from incpt.scene.model import Scene
 
 
 def scene_problems(scene: Scene) -> list[str]:
     """What makes the picture of a valid scene empty or black, a line each."""
     problems = []
-    if not scene.objects:
+    if not scene.objects and not scene.lights:
         problems.append("the scene has no objects: the picture shows the environment only")
     lit = any(c > 0 for c in scene.environment.radiance) and (
         scene.environment.image is None or bool(scene.environment.image.pixels.any())
     )
+    lit = lit or any(light.is_emissive for light in scene.lights)
     if not lit and not any(o.visible and scene.materials[o.material].is_emissive for o in scene.objects):
         problems.append(
-            "the scene has no light: the picture will be black; add an environment or an emissive material"
+            "the scene has no light: the picture will be black; "
+            "add a light, an environment or an emissive material"
         )
     return problems
 
@@ -37,7 +41,8 @@ def describe(scene: Scene) -> list[str]:
         f"objects: {len(scene.objects):,}" + (f" ({hidden:,} hidden)" if hidden else ""),
         f"meshes: {len(meshes):,} with {stored:,} triangles; {placed:,} triangles placed",
         f"materials: {len(scene.materials):,}",
-        f"lights: {len(lights):,} emissive objects with {sum(len(o.mesh.faces) for o in lights):,} triangles",
+        f"lights: {_described_lights(scene)}",
+        f"emissive objects: {len(lights):,} with {sum(len(o.mesh.faces) for o in lights):,} triangles",
         f"environment: {_described_environment(scene.environment)}",
     ]
     if scene.objects:
@@ -50,6 +55,17 @@ def describe(scene: Scene) -> list[str]:
         f"{camera.fov_y:g} degrees high"
     )
     return lines + [f"warning: {problem}" for problem in scene_problems(scene)]
+
+
+def _described_lights(scene: Scene) -> str:
+    kinds = Counter(light.kind for light in scene.lights)
+    hidden = sum(not light.visible for light in scene.lights)
+    listed = ", ".join(f"{kinds[kind]:,} {kind}" for kind in KINDS if kinds[kind])
+    return (
+        f"{len(scene.lights):,}"
+        + (f" ({listed})" if listed else "")
+        + (f", {hidden:,} hidden" if hidden else "")
+    )
 
 
 def _described_environment(environment: Environment) -> str:

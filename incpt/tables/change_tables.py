@@ -13,6 +13,7 @@ from incpt.core import affine, layout
 from incpt.device.device import Device
 from incpt.scene.change import Change, diff
 from incpt.scene.enclosing import has_in_bounds
+from incpt.scene.light import Light
 from incpt.scene.model import Object, Scene
 from incpt.tables.light_pairs import has_same_emitters
 
@@ -32,7 +33,8 @@ class Difference:
     second.
 
     boxes    (N, 2, 3) bounds in world space around objects that are elsewhere, have another shape, or have
-             come or gone, where they were and where they are. None where only materials differ.
+             come or gone, where they were and where they are. None where only materials differ. Also around
+             lights that differ in anything, which rays may meet.
     objects  (len(objects),) whether it is enough that a path meets the object, whose material is another one.
     lights   whether lights differ: then the scenes need `paired_tables`, which say which of them do.
     padding  of the boxes, per metre of distance from the world's origin.
@@ -83,7 +85,9 @@ def difference(old: Scene, new: Scene) -> Difference:
     placed += [*_changed_cutouts(old, old, new, change), *_changed_cutouts(new, old, new, change)]
     # Paths start in the media around the camera, whose boundaries they need not meet.
     placed += [*_changed_around_camera(old, change), *_changed_around_camera(new, change)]
-    boxes = np.array([obj.world_bounds for obj in placed]).reshape(-1, 2, 3)
+    around = [obj.world_bounds for obj in placed]
+    around += [light.world_bounds for scene in (old, new) for light in _met_lights(scene, change.lights)]
+    boxes = np.array(around).reshape(-1, 2, 3)
     padding = _PADDING * max((_amplification(obj) for obj in placed), default=1.0)
     differing = not has_same_emitters(old, new)
     return Difference(boxes, _with_other_materials(new, change), differing, padding)
@@ -92,6 +96,10 @@ def difference(old: Scene, new: Scene) -> Difference:
 def _displaced(change: Change) -> frozenset[str]:
     """Objects that rays meet elsewhere than before."""
     return change.added | change.removed | change.moved | change.deformed | change.reshaped
+
+
+def _met_lights(scene: Scene, names: frozenset[str]) -> list[Light]:
+    return [light for light in scene.lights if light.name in names and light.is_emissive and light.has_size]
 
 
 def _shown(scene: Scene, names: frozenset[str]) -> list[Object]:

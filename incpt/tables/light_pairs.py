@@ -21,11 +21,21 @@ import numpy.typing as npt
 from incpt.core import layout
 from incpt.core.layout import TextureSlot
 from incpt.device.device import Device
+from incpt.scene.light import Light
 from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
 from incpt.tables import lights
 from incpt.tables.emitter_shares import face_shares
 from incpt.tables.lights import Array, LightTables, TriangleLights
+from incpt.tables.shaped_lights import (
+    NO_SHAPED_LIGHTS,
+    ShapedLights,
+    Shares,
+    emissive_lights,
+    shaped_planes,
+    shares,
+    weight,
+)
 from incpt.tables.textures import TextureTables
 
 _SAME_AREA = 1e-6
@@ -59,7 +69,8 @@ def has_same_emitters(old: Scene, new: Scene) -> bool:
             )
         return found
 
-    return seen(old) == seen(new)
+    same_lights = old.lights is new.lights or emissive_lights(old) == emissive_lights(new)
+    return same_lights and seen(old) == seen(new)
 
 
 def paired_light_tables(
@@ -67,11 +78,54 @@ def paired_light_tables(
 ) -> tuple[LightTables, LightTables]:
     """The light tables of both scenes; `has_image` tells whether their environment has an image that shines.
     `textures` are those of both. Raises DeviceError."""
+    share, shaped = lights.share_of_triangles(has_image), (NO_SHAPED_LIGHTS, NO_SHAPED_LIGHTS)
+    pairs = _light_pairs(old, new)
+    if pairs:
+        chosen = shares(has_image, _triangle_power(old, new), [_common_weight(pair) for pair in pairs])
+        share, shaped = chosen.triangles, paired_shaped_lights(pairs, chosen)
     numbers = (textures[0].emission_number, textures[1].emission_number)
-    pair = paired_lights(old, new, lights.share_of_triangles(has_image), numbers)
+    triangles = paired_lights(old, new, share, numbers)
     first, second = (
-        LightTables.of(device, triangles, has_image, scene.objects, own.has(TextureSlot.EMISSION))
-        for triangles, scene, own in zip(pair, (old, new), textures, strict=True)
+        LightTables.of(device, each, has_image, scene.objects, own.has(TextureSlot.EMISSION), beside)
+        for each, scene, own, beside in zip(triangles, (old, new), textures, shaped, strict=True)
+    )
+    return first, second
+
+
+_Pair = tuple[Light | None, Light | None]
+"""A light in the old scene and in the new one, None where it is not there."""
+
+
+def _light_pairs(old: Scene, new: Scene) -> list[_Pair]:
+    """Those that are objects of their own and emit anything in one of the scenes, suns first. They are the
+    same where they have the same name."""
+    before, after = ({light.name: light for light in emissive_lights(scene)} for scene in (old, new))
+    pairs = [(before.get(name), after.get(name)) for name in {**before, **after}]
+    return sorted(pairs, key=lambda pair: not any(light is not None and light.is_far for light in pair))
+
+
+def _common_weight(pair: _Pair) -> float:
+    return max(weight(light) for light in pair if light is not None)
+
+
+def _triangle_power(old: Scene, new: Scene) -> float:
+    weights = common_weights(old, new)
+    found = _rows(old, new, weights, _shares(old, new, weights), (_untextured, _untextured))
+    rows = _Rows.joined(found).chosen()
+    return float(np.pi * (rows.weight * rows.share * rows.area).sum())
+
+
+def paired_shaped_lights(pairs: list[_Pair], chosen: Shares) -> tuple[ShapedLights, ShapedLights]:
+    """The lights of both scenes that are objects of their own. Those that differ have ShapedFlag.CHANGED."""
+    changed = np.array([first != second for first, second in pairs])
+    suns = sum(any(light is not None and light.is_far for light in pair) for pair in pairs)
+    first, second = (
+        ShapedLights(
+            shaped_planes([pair[i] for pair in pairs], chosen.lights, changed),
+            suns,
+            float(chosen.lights.sum()),
+        )
+        for i in range(2)
     )
     return first, second
 
@@ -94,8 +148,8 @@ def paired_lights(
     """The lights of both scenes, the same ones in the same order; see `lights.triangle_lights`. Those that
     differ have LightFlag.CHANGED. `texture_numbers` are those of materials in both scenes."""
     weights = common_weights(old, new)
-    shares = _shares(old, new, weights)
-    rows = _Rows.joined(_rows(old, new, weights, shares, texture_numbers)).chosen()
+    face_parts = _shares(old, new, weights)
+    rows = _Rows.joined(_rows(old, new, weights, face_parts, texture_numbers)).chosen()
     power = rows.weight * rows.share * rows.area
     if len(power) == 0:
         nothing = TriangleLights(np.zeros((len(layout.LightPlane), 0), np.float32), {})
@@ -113,7 +167,7 @@ def paired_lights(
                 rows.errors[i],
             ),
             densities,
-            shares[i],
+            face_parts[i],
         )
         for i in range(2)
     )

@@ -121,13 +121,16 @@ def test_power_comes_out(kind: str, radius: float) -> None:
     assert light.watts == pytest.approx((70, 35, 0))
     # From far away intensity is radiance times the face that is seen, at an angle from -z.
     if light.kind in ("rectangle", "disk"):
+
         def intensity(angle: float) -> float:
             return max(np.cos(angle), 0) * light.emitted[0] * light.area
     else:
         inner, outer = light.cone if kind == "spot" else (-2, -3)
+
         def intensity(angle: float) -> float:
             t = np.clip((np.cos(angle) - outer) / (inner - outer), 0, 1)
             return float(t * t * (3 - 2 * t) * light.emitted[0] * (light.face if light.has_size else 1))
+
     total, _ = integrate.quad(lambda a: intensity(a) * 2 * np.pi * np.sin(a), 0, np.pi, points=[np.pi / 6])
     assert total == pytest.approx(70, rel=1e-4)
 
@@ -246,7 +249,7 @@ def test_each_technique_alone_gives_the_same(names: str, technique: str) -> None
     scene = plates(*chosen, sky="sky" in names)
     if "glass" in names:
         frosted = Material((0.9, 1, 0.9), transmission=1, roughness=0.4, absorption=(1, 0, 1))
-        ball = Object("ball", shape("cube"), "glass", (0.7, 0.4, 0.5), (0, 30, 0), (0.5, 0.8, 0.3))
+        ball = Object("frosted", shape("cube"), "glass", (0.7, 0.4, 0.5), (0, 30, 0), (0.5, 0.8, 0.3))
         scene = scene.with_material("glass", **vars(frosted)).with_added(ball)
     arguments: dict[str, Any] = {"max_bounces": 2, "transmission_bounces": 4, "size": (32, 32)}
     both = repeat(scene, 64, **arguments)
@@ -295,7 +298,7 @@ def test_blocks_and_wavefront_agree(names: str) -> None:
     chosen.append(Light("shadowless", "point", (1, 1, 1), power=20, casts_shadows=False))
     scene = plates(*chosen, sky="sky" in names)
     if "glass" in names:
-        ball = Object("ball", shape("sphere"), "glass", (0.5, 0.4, 0.5), scale=(0.7, 0.7, 0.7))
+        ball = Object("clear", shape("sphere"), "glass", (0.5, 0.4, 0.5), scale=(0.7, 0.7, 0.7))
         scene = scene.with_material("glass", transmission=1.0, roughness=0.0, absorption=(1, 0, 1))
         scene = scene.with_added(ball)
     images = []

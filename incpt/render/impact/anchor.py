@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from incpt.render.plan import CountArray
 from incpt.scene.change import affected_objects, diff
-from incpt.scene.model import Object, Scene
+from incpt.scene.model import Placed, Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,12 +22,12 @@ class Anchor:
     scene: Scene
     worth: CountArray
 
-    def affected(self, scene: Scene) -> tuple[Object, ...]:
-        """The objects that look different in `scene`, as they are here and as they are there."""
+    def affected(self, scene: Scene) -> tuple[Placed, ...]:
+        """The objects and lights that look different in `scene`, as they are here and as they are there."""
         return tuple(affected_objects(self.scene, scene, diff(self.scene, scene)))
 
     def touched(self, scene: Scene) -> frozenset[str]:
-        """The names of the objects that differ in `scene`, or that wear a material that does."""
+        """The names of the objects and lights that differ in `scene`, or that wear a material that does."""
         return _touched(self.scene, scene)
 
     def serves(self, scene: Scene, edited: Scene) -> bool:
@@ -39,4 +39,4 @@ class Anchor:
 def _touched(old: Scene, new: Scene) -> frozenset[str]:
     change = diff(old, new)
     wearing = {obj.name for scene in (old, new) for obj in scene.objects if obj.material in change.materials}
-    return change.objects | wearing
+    return change.objects | change.lights | wearing

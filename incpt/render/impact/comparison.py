@@ -158,7 +158,8 @@ def _seen_pair(anchor: Anchor, old: CenterHits, new: CenterHits, seen: list[Wind
         number.setdefault(obj.name, len(number))
     common = np.array([number[obj.name] for obj in new.scene.objects] + [-1], np.int32)
     differs = np.zeros(len(number) + 1, np.bool_)
-    differs[[number[name] for name in anchor.touched(new.scene)]] = True
+    # Lights are nothing that pixels show: rays through their centres go on to what is behind.
+    differs[[number[name] for name in anchor.touched(new.scene) if name in number]] = True
     # Outside of the windows both scenes show the same.
     labels = _label(old.objects, old.objects)
     changed = np.zeros(labels.shape, np.bool_)

@@ -10,7 +10,7 @@ from incpt.render.first_hits import Window
 from incpt.render.plan import SPARSE_STEP
 from incpt.render.tiles import IntArray, TileGrid
 from incpt.scene.camera import Camera
-from incpt.scene.model import Object
+from incpt.scene.model import Placed
 
 PASSES = (0, 10, 2, 8, 5, 15, 7, 13, 1, 11, 3, 9, 4, 14, 6, 12)
 """The pixel of each square of 4 x 4 that each pass takes: an ordered dither (Bayer 1973), so that those of
@@ -32,7 +32,7 @@ def squares(grid: TileGrid, chosen: npt.NDArray[np.bool_]) -> IntArray:
     return (SPARSE_STEP * (row * grid.columns + column)).astype(np.int32)
 
 
-def windows(grid: TileGrid, camera: Camera, objects: tuple[Object, ...]) -> list[Window]:
+def windows(grid: TileGrid, camera: Camera, objects: tuple[Placed, ...]) -> list[Window]:
     """The rectangles around what is seen of the bounds of each object."""
     found = []
     for obj in objects:
@@ -62,7 +62,7 @@ def _cut_off(camera: Camera, corners: npt.NDArray[np.float64]) -> npt.NDArray[np
     return np.concatenate([corners, corners[first] + share[:, None] * (corners[last] - corners[first])])
 
 
-def seen_tiles(grid: TileGrid, camera: Camera, objects: tuple[Object, ...]) -> IntArray:
+def seen_tiles(grid: TileGrid, camera: Camera, objects: tuple[Placed, ...]) -> IntArray:
     """The tiles in the windows of the objects, row by row for each object, each tile once."""
     chosen = [
         (np.arange(top // size, -(-bottom // size))[:, None] * grid.columns

@@ -69,7 +69,8 @@ class PairTracer:
         with `old`. Returns how many partners there are. It waits for the device once, where anything
         differs."""
         assert buffers.stride >= batch.path_count, "pairs need room for each path of the path buffer"
-        assert old.light_count == batch.tables.light_count, "both scenes choose among the same lights"
+        assert old.light_count == batch.tables.light_count, "both scenes choose among the same triangles"
+        assert old.lights.shaped.count == batch.tables.lights.shaped.count, "and the same lights"
         if changes.is_empty:
             self.tracer.trace(batch)
             self._device.fill(buffers.partner_place, layout.NO_INDEX, 4 * batch.path_count)

@@ -1,0 +1,199 @@
+"""Edits of lights that are objects of their own: what paths meet of them, and the picture after them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from support.pairs import check, traced_pairs
+from support.renders import assert_same_mean, repeat
+from support.small_scenes import mixed_scene
+
+from incpt.benchmarks.kit.scenes import cornell
+from incpt.core.settings import RenderSettings
+from incpt.device.device import Device
+from incpt.render.blocks import traces_in_blocks
+from incpt.render.modes import Mode
+from incpt.render.session import Session
+from incpt.scene.change import diff
+from incpt.scene.light import Light
+from incpt.scene.model import Scene
+from incpt.tables.geometry_pool import GeometryPool
+from incpt.tables.scene_tables import paired_tables
+
+SMALL = RenderSettings(size=(44, 28), tile_size=8, max_bounces=3)
+DOWN = (-90, 0, 0)
+LAMPS = (
+    Light("bulb", "point", (0.8, 1.2, 0.8), radius=0.15, power=20),
+    Light("pane", "rectangle", (-0.6, 1.5, 0.4), (-60, 0, 0), size=(0.8, 0.4), radiance=6),
+    Light("disk", "disk", (-1, 0.8, 1), (0, 150, 0), radius=0.2, power=10, camera_visible=False),
+    Light("spot", "spot", (0.2, 1.8, 1), DOWN, radius=0, power=30, spot_angle=70),
+    Light("star", "point", (-0.3, 0.9, 1.2), radius=0, power=5, casts_shadows=False),
+    Light("sun", "sun", rotation=(-40, 30, 0), angle=4, irradiance=1),
+)
+
+
+def mixed() -> Scene:
+    """Image, triangles, media, and lights of every kind."""
+    return replace(mixed_scene(), settings=SMALL, lights=LAMPS)
+
+
+def room() -> Scene:
+    """All is tested by brute force in blocks."""
+    lights = (
+        Light("bulb", "sphere", (0.3, 1.2, 0.3), radius=0.1, power=5),
+        Light("pane", "rectangle", (-0.4, 1.8, 0), DOWN, size=(0.5, 0.3), radiance=5),
+    )
+    return replace(cornell(), settings=SMALL, lights=lights)
+
+
+def alone() -> Scene:
+    """Nothing else shines."""
+    dark = {name: replace(one, emission=(0, 0, 0)) for name, one in cornell().materials.items()}
+    return replace(room(), materials=dark)
+
+
+@dataclass(frozen=True)
+class Edit:
+    """An edit of a scene, and the share of the paths that may meet it at most."""
+
+    name: str
+    scene: Callable[[], Scene]
+    apply: Callable[[Scene], Scene]
+    at_most: float = 1.0
+
+
+NEW = Light("new", "disk", (0.3, 1.4, 0.6), DOWN, radius=0.2, power=15)
+EDITS = [
+    Edit("move a ball", mixed, lambda s: s.with_light("bulb", position=(0.7, 1.0, 0.9))),
+    Edit("dim a ball", mixed, lambda s: s.with_light("bulb", power=10)),
+    Edit("grow a ball", mixed, lambda s: s.with_light("bulb", radius=0.25)),
+    Edit("turn a pane", mixed, lambda s: s.with_light("pane", rotation=(-30, 20, 0))),
+    Edit("resize a pane", mixed, lambda s: s.with_light("pane", size=(0.4, 0.9))),
+    Edit("both sides", mixed, lambda s: s.with_light("pane", double_sided=True)),
+    Edit("colour", mixed, lambda s: s.with_light("disk", color=(1, 0.2, 0.1))),
+    Edit("show a disk", mixed, lambda s: s.with_light("disk", camera_visible=True)),
+    Edit("hide a ball", mixed, lambda s: s.with_light("bulb", camera_visible=False), 0.4),
+    Edit("remove a ball", mixed, lambda s: s.without_light("bulb")),
+    Edit("switch a ball off", mixed, lambda s: s.with_light("bulb", visible=False)),
+    Edit("no power", mixed, lambda s: s.with_light("bulb", power=0)),
+    Edit("add", mixed, lambda s: s.with_added_light(NEW)),
+    Edit("turn a spot", mixed, lambda s: s.with_light("spot", rotation=(-60, 0, 0)), 0.4),
+    Edit("narrow a spot", mixed, lambda s: s.with_light("spot", spot_angle=50, spot_blend=0.6), 0.4),
+    Edit("a spot gets a size", mixed, lambda s: s.with_light("spot", radius=0.1)),
+    Edit("shadows", mixed, lambda s: s.with_light("star", casts_shadows=True), 0.3),
+    Edit("no shadows", mixed, lambda s: s.with_light("bulb", casts_shadows=False)),
+    Edit("another kind", mixed, lambda s: s.with_light("bulb", kind="rectangle", rotation=DOWN)),
+    Edit("rename", mixed, lambda s: s.with_light("bulb", name="ball", position=(0.7, 1.1, 0.7))),
+    Edit("lamp of triangles", mixed, lambda s: s.with_object("lamp", position=(0.5, 2.2, 0))),
+    Edit("lamp of triangles goes", mixed, lambda s: s.without_object("lamp")),
+    Edit("object", mixed, lambda s: s.with_object("red cube", position=(0.15, 0.5, -0.1)), 0.45),
+    Edit("object and light", mixed, lambda s: s.with_object("red cube", rotation=(0, 75, 0)).with_light(
+        "pane", position=(-0.5, 1.4, 0.3))),
+    Edit("room: ball", room, lambda s: s.with_light("bulb", position=(0.2, 1.1, 0.3))),
+    Edit("room: pane", room, lambda s: s.with_light("pane", radiance=9)),
+    Edit("room: block", room, lambda s: s.with_object("short", position=(0.3, 0.3, 0.4)), 0.6),
+    Edit("room: all go", room, lambda s: replace(s, lights=())),
+    Edit("alone: ball", alone, lambda s: s.with_light("bulb", position=(0.2, 1.1, 0.3), power=7)),
+    Edit("alone: first triangles", alone, lambda s: s.with_material("lamp", emission=(17, 12, 4))),
+]  # fmt: skip
+
+
+@pytest.fixture(params=[False, True], ids=["wavefront", "blocks"])
+def in_blocks(request: pytest.FixtureRequest, device: Device) -> bool:
+    if request.param and not traces_in_blocks(device):
+        pytest.skip("no blocks on this device")
+    return bool(request.param)
+
+
+@pytest.mark.parametrize("edit", EDITS, ids=lambda edit: edit.name)
+def test_a_path_that_met_nothing_that_changed_brings_the_same(
+    edit: Edit, in_blocks: bool, device: Device
+) -> None:
+    old = edit.scene()
+    check(traced_pairs(device, old, edit.apply(old), in_blocks), edit.at_most)
+
+
+@pytest.mark.parametrize("edit", EDITS[:4], ids=lambda edit: edit.name)
+def test_undo_is_an_edit_too(edit: Edit, in_blocks: bool, device: Device) -> None:
+    old = edit.scene()
+    check(traced_pairs(device, edit.apply(old), old, in_blocks), edit.at_most)
+
+
+def test_far_from_the_origin(in_blocks: bool, device: Device) -> None:
+    """Where a float is a millimetre wide, boxes around lights hold what rays meet of them."""
+    scene, offset = mixed(), (8000.0, 100.0, -6000.0)
+
+    def moved(position: tuple[float, ...]) -> tuple[float, ...]:
+        return tuple(np.add(position, offset).tolist())
+
+    camera = replace(scene.camera, position=moved(scene.camera.position), target=moved(scene.camera.target))
+    old = replace(
+        scene,
+        camera=camera,
+        objects=tuple(replace(one, position=moved(one.position)) for one in scene.objects),
+        lights=tuple(replace(one, position=moved(one.position)) for one in scene.lights),
+    )
+    for name in ("bulb", "pane"):
+        new = old.with_light(name, position=moved((0.5, 1.1, 0.7)))
+        check(traced_pairs(device, old, new, in_blocks))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", ["dim a ball", "add", "lamp of triangles goes", "room: all go", "alone: first triangles"]
+)
+def test_lights_of_two_scenes_bring_what_those_of_each_bring(
+    name: str, device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Choosing among the lights of both scenes changes no mean, in either of them."""
+    edit = next(one for one in EDITS if one.name == name)
+    old = edit.scene()
+    new = edit.apply(old)
+    pool = GeometryPool.of(device)
+    for chosen, scene in enumerate((old, new)):
+        plain = repeat(scene, 128, max_bounces=2)
+        tables = paired_tables(pool, old, new)
+        with monkeypatch.context() as patch:
+            patch.setattr("incpt.render.session.tables_of", lambda *_, both=tables, i=chosen: both[i])
+            paired = repeat(scene, 128, max_bounces=2)
+        assert_same_mean(plain, paired, relative=0.02)
+
+
+@pytest.mark.parametrize("name", ["move a ball", "turn a spot", "add", "room: pane", "another kind"])
+def test_edits_then_convergence_equal_a_fresh_render(name: str, device: Device) -> None:
+    edit = next(one for one in EDITS if one.name == name)
+    old = edit.scene()
+    new = edit.apply(old)
+    settings = replace(SMALL, size=(20, 14), base_nor=16, strategy="impact")
+    session = Session(old, settings=settings, device=device)
+    session.render(64)
+    assert diff(old, new).is_local
+    session.edit(new)
+    assert session.mode is Mode.INCREMENTAL
+    session.step()
+    session.render(256)
+    fresh = repeat(new, 128, 4, size=(20, 14), max_bounces=3)
+    noise = np.sqrt(fresh.var(axis=0, ddof=1).mean())
+    difference = session.image() - fresh.mean(axis=0)
+    assert np.sqrt((difference**2).mean()) < 1.5 * noise
+    assert abs(difference.mean()) < 6 * noise / np.sqrt(difference.size)
+
+
+def test_edits_of_suns_start_over(device: Device) -> None:
+    session = Session(mixed(), device=device)
+    session.render(1)
+    session.edit(session.scene.with_light("sun", irradiance=2))
+    assert session.mode is Mode.BASE
+
+
+def test_an_edit_back_is_the_kept_picture(device: Device) -> None:
+    scene = mixed()
+    session = Session(scene, device=device)
+    session.render(4)
+    before = session.image()
+    session.edit(scene.with_light("bulb", power=90))
+    session.edit(scene.with_light("bulb", power=20))
+    np.testing.assert_array_equal(session.image(), before)
