@@ -10,7 +10,6 @@ from imgui_bundle import imgui
 from incpt.device.device import all_devices, device_name
 from incpt.render.strategies import strategy_of
 from incpt.scene import edits
-from incpt.scene.model import Object, Scene
 from incpt.ui.commands import camera, command, files, materials, menus, objects, rendering
 from incpt.ui.editor.editor import Editor
 from incpt.ui.editor.records import Records
@@ -18,6 +17,7 @@ from incpt.ui.layout import Layout
 from incpt.ui.panels import camera as camera_panel
 from incpt.ui.panels import display as display_panel
 from incpt.ui.panels import environment as environment_panel
+from incpt.ui.panels import light as light_panel
 from incpt.ui.panels import material as material_panel
 from incpt.ui.panels import name as name_panel
 from incpt.ui.panels import notices, outliner, plots, render, tool, transform
@@ -72,7 +72,7 @@ class Workspace:
         if outcome.selection != editor.selection:
             editor.select(outcome.selection)
         if outcome.switched is not None:
-            is_shown = editor.scene.object(outcome.switched).visible
+            is_shown = editor.scene.placed(outcome.switched).visible
             scene = edits.set_visible(editor.scene, (outcome.switched,), not is_shown)
             editor.propose(scene, "Hide" if is_shown else "Show")
         if outcome.renaming is not None:
@@ -92,13 +92,16 @@ class Workspace:
             if is_open:
                 editor.tool, snap = tool.draw(editor.tool, editor.preferences.snap, refusals)
                 editor.change_snap(snap)
-        obj = editor.scene.object(name)
+        one = editor.scene.placed(name)
         with widgets.section("Transform") as is_open:
             if is_open:
-                new, self._is_uniform = transform.draw(obj, self._is_uniform, refusals)
-                if new is not obj:
-                    editor.propose(_with_object(editor.scene, name, new), "Transform", _key())
-        self._draw_material(editor, name, refusals)
+                new, self._is_uniform = transform.draw(one, self._is_uniform, refusals)
+                if new is not one:
+                    editor.propose(editor.scene.with_all({name: new}), "Transform", _key())
+        if name in editor.scene.light_index:
+            _draw_light(editor, name, refusals)
+        else:
+            self._draw_material(editor, name, refusals)
         _tell(editor, refusals)
 
     def _draw_material(self, editor: Editor, name: str, refusals: Refusals) -> None:
@@ -182,6 +185,15 @@ class Workspace:
                 plots.draw(self.records, editor.preferences.step_ms)
 
 
+def _draw_light(editor: Editor, name: str, refusals: Refusals) -> None:
+    with widgets.section("Light") as is_open:
+        if is_open:
+            light = editor.scene.light(name)
+            new = light_panel.draw(light, refusals)
+            if new is not light:
+                editor.propose(editor.scene.with_all({name: new}), f"Light {name}", _key())
+
+
 def _draw_notices(editor: Editor, area: Rect[float]) -> None:
     editor.notices = editor.notices.current(editor.now())
     dismissed = notices.draw_notices(editor.notices.said, area)
@@ -208,10 +220,6 @@ def _tell(editor: Editor, refusals: Refusals) -> None:
     # A refusal is no line in the panel: it lasts for one frame only, and the panel may be scrolled.
     for message in refusals.messages:
         editor.say(message, "warning")
-
-
-def _with_object(scene: Scene, name: str, new: Object) -> Scene:
-    return replace(scene, objects=tuple(new if o.name == name else o for o in scene.objects))
 
 
 def _apply_material_outcome(editor: Editor, material: str, outcome: material_panel.Outcome) -> None:

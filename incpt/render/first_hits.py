@@ -18,6 +18,7 @@ from incpt.render.batch import Batch
 from incpt.render.params import path_params
 from incpt.render.plan import Cursor, Queue, plan_step
 from incpt.render.tracer import Tracer
+from incpt.scene.light import nearest_seen
 from incpt.tables.scene_tables import SceneTables
 
 Window = tuple[int, int, int, int]
@@ -80,15 +81,20 @@ def first_hits(
 def object_at(
     tracer: Tracer, tables: SceneTables, settings: RenderSettings, point: tuple[float, float]
 ) -> str | None:
-    """The name of the object at a point (x, y) from the top left, in units of the picture, or None."""
+    """The name of the object or light at a point (x, y) from the top left, in units of the picture, or
+    None."""
     params = path_params(tables, settings)
     camera = params["camera"]
     # The point is the centre of a picture of one pixel.
     camera["forward"] += (2 * point[0] - 1) * camera["right"] + (1 - 2 * point[1]) * camera["up"]
     params["width"] = params["height"] = params["tile_size"] = 1
-    _, object_ids = _traced(tracer, tables, one_slot(), params)
-    index = int(object_ids[0])
-    return tables.scene.objects[index].name if index >= 0 else None
+    surface, object_ids = _traced(tracer, tables, one_slot(), params)
+    index, scene = int(object_ids[0]), tables.scene
+    ray = camera["forward"].astype(np.float64)
+    light = nearest_seen(scene.lights, scene.camera.position, ray / np.linalg.norm(ray), float(surface[3]))
+    if light is not None:
+        return light.name
+    return scene.objects[index].name if index >= 0 else None
 
 
 def one_slot() -> npt.NDArray[np.void]:

@@ -344,8 +344,8 @@ class Session:
         return first_hits.first_hits(self._tracer, self._tables, self.settings, size, window)
 
     def pick(self, pixel: tuple[int, int]) -> str | None:
-        """The name of the object under a pixel (x, y) from the top left, or None. Raises InputError outside
-        the image."""
+        """The name of the object or light under a pixel (x, y) from the top left, or None. Raises InputError
+        outside the image."""
         width, height = self.size
         x, y = pair("pixel", pixel, _PIXEL)
         if not (0 <= x < width and 0 <= y < height):
@@ -353,8 +353,8 @@ class Session:
         return self.pick_point(((int(x) + 0.5) / width, (int(y) + 0.5) / height))
 
     def pick_point(self, point: tuple[float, float]) -> str | None:
-        """The name of the object at a point (x, y) from the top left, in units of the image, or None: where
-        there is none, and outside the image."""
+        """The name of the object or light at a point (x, y) from the top left, in units of the image, or
+        None: where there is none, and outside the image."""
         x, y = pair("point", point, "a place (x, y) in the image")
         if not (0 <= x <= 1 and 0 <= y <= 1):
             return None

@@ -16,6 +16,7 @@ from incpt.core.checks import require
 from incpt.scene.light import Light
 from incpt.scene.mesh import is_deformation
 from incpt.scene.model import Object, Placed, Scene
+from incpt.scene.transform import Transform
 
 
 @dataclass(frozen=True)
@@ -103,13 +104,18 @@ def _changed_lights(old: Scene, new: Scene) -> list[Light]:
     """Those that differ, as they were and as they are."""
     if old.lights is new.lights or old.lights == new.lights:
         return []
-    before, after = ({light.name: light for light in scene.lights} for scene in (old, new))
+    before, after = ({light.name: _as_it_shines(light) for light in scene.lights} for scene in (old, new))
     return [
         light
         for own, other in ((before, after), (after, before))
         for name, light in own.items()
         if other.get(name) != light
     ]
+
+
+def _as_it_shines(light: Light) -> Light:
+    """The light without what makes no difference: where a sun stands."""
+    return replace(light, transform=Transform(rotation=light.rotation)) if light.is_far else light
 
 
 def _without_equal_ends(

@@ -1,4 +1,4 @@
-"""Edits of objects and materials: functions from a Scene to another one.
+"""Edits of objects, lights and materials: functions from a Scene to another one.
 
 Those that make objects also return the names of the new ones, to be selected. What they refuse they raise
 as InputError and leave the scene as it was, which an immutable one does by itself.
@@ -6,6 +6,7 @@ as InputError and leave the scene as it was, which an immutable one does by itse
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -18,9 +19,10 @@ from incpt.core import affine
 from incpt.core.affine import Vector
 from incpt.core.errors import InputError
 from incpt.scene.checks import LARGEST
+from incpt.scene.light import Light
 from incpt.scene.material import Material
 from incpt.scene.mesh_part import MeshPart
-from incpt.scene.model import Object, Scene
+from incpt.scene.model import Object, Placed, Scene
 from incpt.scene.shapes import shape
 from incpt.scene.transform import SMALLEST_SCALE, Transform
 
@@ -28,6 +30,15 @@ Names = tuple[str, ...]
 
 DEFAULT_MATERIAL = "grey"
 """The material of new objects where nothing else is said. It is made when it is not there."""
+LIGHT_NAMES = {
+    "point": "point light",
+    "spot": "spot light",
+    "sun": "sun",
+    "rectangle": "rectangle light",
+    "disk": "disk light",
+    "sphere": "sphere light",
+}
+"""What lights of each kind are called."""
 _SAME_ROTATION_DEG = 1e-4
 """Angles that differ by less are the same: a gizmo's matrices are float32."""
 _RIGID = 1e-5
@@ -54,7 +65,7 @@ def add_shape(
     mesh = shape(name)
     scene, material = _with_material_for_new(scene, material)
     position = _standing_on(at or floor_point(scene), mesh.bounds)
-    new = Object(unique_name(name, scene.object_index), mesh, material, position)
+    new = Object(unique_name(name, scene.names), mesh, material, position)
     return scene.with_added(new), (new.name,)
 
 
@@ -80,57 +91,81 @@ def add_parts(
                 scene, brought[part.material_name] = _with_brought(scene, part.material_name, part.material)
             used = brought[part.material_name]
         wanted = label if part.name is None else f"{label}/{part.name}"
-        name = unique_name(wanted or "mesh", scene.object_index)
+        name = unique_name(wanted or "mesh", scene.names)
         scene = scene.with_added(Object(name, part.mesh, used, position))
         names.append(name)
     return scene, tuple(names)
 
 
-# ---------------------------------------------------------------------------------------------- objects
+def add_light(scene: Scene, kind: str) -> tuple[Scene, Names]:
+    """The scene with a light of that kind above the camera's target, which it lights from as high as suits
+    what the camera looks at; the new name. Raises InputError."""
+    camera = scene.camera
+    height = 0.4 * math.dist(camera.position, camera.target)
+    x, y, z = camera.target
+    name = unique_name(LIGHT_NAMES.get(kind, kind), scene.names)
+    values: dict[str, Any] = {"radius": 0.05 * height, "size": (0.5 * height, 0.5 * height)}
+    if kind != "sun":
+        values["power"] = 25 * height**2
+    position = _within((x, y + height, z))
+    new = Light(name, kind, position, (-50, 30, 0) if kind == "sun" else (-90, 0, 0), **values)
+    return scene.with_added_light(new), (new.name,)
+
+
+# --------------------------------------------------------------------------------------- objects, lights
 
 
 def duplicate(scene: Scene, names: Iterable[str]) -> tuple[Scene, Names]:
-    """The scene with a copy of every named object in its place, with the same mesh and material; the names
-    of the copies."""
+    """The scene with a copy of every named object and light in its place, with the same mesh and material;
+    the names of the copies."""
     copies: list[str] = []
     for name in names:
-        copy = unique_name(name, scene.object_index)
-        scene = scene.with_added(replace(scene.object(name), name=copy))
+        copy, one = unique_name(name, scene.names), scene.placed(name)
+        if isinstance(one, Light):
+            scene = scene.with_added_light(replace(one, name=copy))
+        else:
+            scene = scene.with_added(replace(one, name=copy))
         copies.append(copy)
     return scene, tuple(copies)
 
 
 def delete(scene: Scene, names: Iterable[str]) -> Scene:
-    """The scene without those objects. Raises InputError."""
+    """The scene without those objects and lights. Raises InputError."""
     for name in names:
-        scene = scene.without_object(name)
+        scene = scene.without(name)
     return scene
 
 
 def rename(scene: Scene, old: str, new: str) -> Scene:
-    """The scene with one object called otherwise, in its place. Raises InputError: a name that is empty or
-    taken."""
-    new = _checked_name(new, old, scene.object_index, "object")
-    return scene if new == old else scene.with_object(old, name=new)
+    """The scene with one object or light called otherwise, in its place. Raises InputError: a name that is
+    empty or taken."""
+    new = _checked_name(new, old, scene.names, "light" if old in scene.light_index else "object")
+    return scene if new == old else scene.with_placed(old, name=new)
 
 
 def set_visible(scene: Scene, names: Iterable[str], visible: bool) -> Scene:
-    """The scene with those objects shown or hidden. Raises InputError."""
+    """The scene with those objects and lights shown or hidden. Raises InputError."""
     return _with_each(scene, names, {"visible": visible})
 
 
 def assign_material(scene: Scene, names: Iterable[str], material: str) -> Scene:
-    """The scene with those objects made of another material. Raises InputError."""
+    """The scene with those objects made of another material; lights among them have none. Raises
+    InputError."""
     scene.material(material)
-    return _with_each(scene, names, {"material": material})
+    objects = [name for name in names if name not in scene.light_index]
+    return _with_each(scene, objects, {"material": material})
 
 
 def bounds_of(scene: Scene, names: Collection[str] = ()) -> npt.NDArray[np.float64] | None:
-    """(2, 3) bounds in world space of the named objects, or of all that are shown; None without any.
+    """(2, 3) bounds in world space of the named objects and lights, or of all that are shown, suns left out;
+    None without any.
 
     Raises InputError for a name that is not in the scene.
     """
-    chosen = [scene.object(name) for name in names] or [o for o in scene.objects if o.visible]
+    chosen: list[Placed] = [scene.placed(name) for name in names]
+    if not chosen:
+        chosen += [o for o in scene.objects if o.visible]
+        chosen += [light for light in scene.lights if light.visible and not light.is_far]
     if not chosen:
         return None
     boxes = np.stack([obj.world_bounds for obj in chosen])
@@ -143,7 +178,7 @@ def transform_objects(
     delta: npt.ArrayLike,
     pivot: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Scene:
-    """The scene with those objects moved by a (4, 4) affine matrix in world space about a point.
+    """The scene with those objects and lights moved by a (4, 4) affine matrix in world space about a point.
 
     Give the scene from before the drag and the whole movement since then, so that rounding does not add up.
     Rotations stay near what they were and scales keep their signs; what is not turned keeps its angles and
@@ -156,12 +191,12 @@ def transform_objects(
     about = np.asarray(pivot, np.float64)
     changed = {}
     for name in dict.fromkeys(names):
-        obj = scene.object(name)
-        world = obj.world_from_object
+        one = scene.placed(name)
+        world = one.transform.world_from_object
         linear = matrix[:3, :3] @ world[:, :3]
         position = matrix[:3, :3] @ (world[:, 3] - about) + about + matrix[:3, 3]
-        changed[name] = _placed(obj, np.column_stack([linear, position]), matrix[:3, :3])
-    return replace(scene, objects=tuple(changed.get(o.name, o) for o in scene.objects))
+        changed[name] = _moved(one, np.column_stack([linear, position]), matrix[:3, :3])
+    return scene.with_all(changed)
 
 
 # -------------------------------------------------------------------------------------------- materials
@@ -224,9 +259,9 @@ def _checked_name(new: str, old: str, taken: Collection[str], what: str) -> str:
 
 def _with_each(scene: Scene, names: Iterable[str], changes: Mapping[str, Any]) -> Scene:
     for name in names:
-        obj = scene.object(name)
-        if any(getattr(obj, key) != value for key, value in changes.items()):
-            scene = scene.with_object(name, **changes)
+        one = scene.placed(name)
+        if any(getattr(one, key) != value for key, value in changes.items()):
+            scene = scene.with_placed(name, **changes)
     return scene
 
 
@@ -252,17 +287,17 @@ def _standing_on(at: Sequence[float], bounds: npt.NDArray[np.floating[Any]]) -> 
     return _vector(np.asarray(at) - [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
 
 
-def _placed(obj: Object, world: npt.NDArray[np.float64], turn: npt.NDArray[np.float64]) -> Object:
-    """An object under another matrix (3, 4), which `turn` (3, 3) made of its own."""
+def _moved(one: Placed, world: npt.NDArray[np.float64], turn: npt.NDArray[np.float64]) -> Placed:
+    """An object or light under another matrix (3, 4), which `turn` (3, 3) made of its own."""
     world = np.column_stack([world[:, :3], _within(world[:, 3])])
-    if obj.transform.matrix is None:
-        placed = _without_shear(obj.transform, world, turn)
+    if one.transform.matrix is None:
+        transform = _without_shear(one.transform, world, turn)
     else:
         try:
-            placed = obj.transform.moved_to(world)
+            transform = one.transform.moved_to(world)
         except InputError:
-            placed = obj.transform
-    return replace(obj, transform=placed)
+            transform = one.transform
+    return replace(one, transform=transform)
 
 
 def _without_shear(

@@ -292,6 +292,41 @@ class Light:
         return np.stack([place - extent, place + extent])
 
 
+def nearest_seen(
+    lights: tuple[Light, ...], origin: Vector, direction: npt.NDArray[np.float64], limit: float
+) -> Light | None:
+    """The light that a camera ray from `origin` along `direction` (3,), of unit length, meets before all
+    others and before `limit` metres, as the kernels do it; suns only where `limit` is infinite."""
+    found: Light | None = None
+    for light in lights:
+        if light.is_emissive and light.camera_visible and light.has_size:
+            distance = _distance_to(light, np.asarray(origin, np.float64), direction)
+            if distance < limit or (light.is_far and distance == limit and found is None):
+                found, limit = light, distance
+    return found
+
+
+def _distance_to(light: Light, origin: npt.NDArray[np.float64], direction: npt.NDArray[np.float64]) -> float:
+    """Along a ray to the shining side of a light, metres, infinity to a sun; NaN where it does not meet
+    it."""
+    z = light.axes[2]
+    if light.is_far:
+        return math.inf if 1 - direction @ z <= light.cap else math.nan
+    to_center = np.asarray(light.position) - origin
+    if light.kind not in ("rectangle", "disk"):
+        middle = float(to_center @ direction)
+        chord2 = light.half_size[0] ** 2 - float(((to_center - middle * direction) ** 2).sum())
+        distance = middle - math.sqrt(max(chord2, 0.0))
+        return distance if chord2 >= 0 and distance > 0 else math.nan
+    facing = float(direction @ z)
+    if facing == 0 or (facing < 0 and not light.double_sided):
+        return math.nan
+    distance = float(to_center @ z) / facing
+    across = (distance * direction - to_center) @ light.axes[:2].T / light.half_size
+    inside = np.abs(across).max() <= 1 if light.kind == "rectangle" else (across**2).sum() <= 1
+    return distance if inside and distance > 0 else math.nan
+
+
 def changed(light: Light, changes: dict[str, Any]) -> Light:
     """A light with other values; one of STRENGTHS takes the place of the one that it has, and another kind
     may need another one. Raises InputError."""

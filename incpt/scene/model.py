@@ -190,6 +190,11 @@ class Scene:
         return {light.name: i for i, light in enumerate(self.lights)}
 
     @property
+    def everything(self) -> tuple[Placed, ...]:
+        """All objects and lights, in order."""
+        return (*self.objects, *self.lights)
+
+    @property
     def names(self) -> frozenset[str]:
         """Those of all objects and lights."""
         return frozenset((*self.object_index, *self.light_index))
@@ -247,6 +252,20 @@ class Scene:
         new = changed(self.light(name), changes)
         return replace(self, lights=tuple(new if light.name == name else light for light in self.lights))
 
+    def with_placed(self, name: str, /, **changes: Any) -> Scene:
+        """A scene with the object or the light of that name changed; see `with_object` and `with_light`."""
+        is_light = isinstance(name, str) and name in self.light_index
+        return self.with_light(name, **changes) if is_light else self.with_object(name, **changes)
+
+    def with_all(self, placed: Mapping[str, Placed]) -> Scene:
+        """A scene with these in place of the objects and lights of their keys. Raises InputError."""
+        changes: dict[str, Any] = {}
+        if not placed.keys().isdisjoint(self.object_index):
+            changes["objects"] = tuple(placed.get(one.name, one) for one in self.objects)
+        if not placed.keys().isdisjoint(self.light_index):
+            changes["lights"] = tuple(placed.get(one.name, one) for one in self.lights)
+        return replace(self, **changes)
+
     def with_added_light(self, *lights: Light) -> Scene:
         """A scene with more lights."""
         return replace(self, lights=(*self.lights, *lights))
@@ -255,6 +274,11 @@ class Scene:
         """A scene without that light."""
         self.light(name)
         return replace(self, lights=tuple(light for light in self.lights if light.name != name))
+
+    def without(self, name: str) -> Scene:
+        """A scene without the object or the light of that name. Raises InputError."""
+        is_light = isinstance(name, str) and name in self.light_index
+        return self.without_light(name) if is_light else self.without_object(name)
 
     def __getstate__(self) -> dict[str, Any]:
         # A mappingproxy cannot be pickled or deep-copied.

@@ -1,4 +1,4 @@
-"""Which objects are selected: names in the order of selecting, the last of them the active one."""
+"""Which objects and lights are selected: names in the order of selecting, the last of them the active one."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from incpt.scene.model import Scene
 
 @dataclass(frozen=True)
 class Selection:
-    """Names of objects, each once. The active one, the last, is what the inspector shows."""
+    """Names of objects and lights, each once. The active one, the last, is what the inspector shows."""
 
     names: tuple[str, ...] = ()
 
@@ -63,10 +63,10 @@ class Selection:
 
     def within(self, scene: Scene) -> Selection:
         """Without the names that are not in the scene; the same Selection where all are."""
-        kept = tuple(n for n in self.names if n in scene.object_index)
+        kept = tuple(n for n in self.names if n in scene.object_index or n in scene.light_index)
         return self if kept == self.names else Selection(kept)
 
     @classmethod
     def all_of(cls, scene: Scene) -> Selection:
-        """Every object that is shown."""
-        return cls(tuple(o.name for o in scene.objects if o.visible))
+        """Every object and light that is shown."""
+        return cls(tuple(one.name for one in scene.everything if one.visible))

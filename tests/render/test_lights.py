@@ -309,3 +309,22 @@ def test_blocks_and_wavefront_agree(names: str) -> None:
         images.append(session.image())
     assert np.median(np.abs(images[0] - images[1])) < 1e-5
     assert images[0].mean() == pytest.approx(images[1].mean(), rel=1e-3)
+
+
+def test_lights_are_picked_where_they_are_seen() -> None:
+    ball = Light("ball", "sphere", (0.5, 0, 0), radius=0.3)
+    pane = Light("pane", "rectangle", (-0.5, 0, 0), (0, 180, 0), size=(0.5, 0.5))
+    sun = Light("sun", "sun", rotation=(0, 190, 0), angle=3)
+    scene = replace(camera_at(ball, pane, sun), camera=Camera((0, 0, 3), (0, 0, 0), fov_y=40))
+    session = Session(scene, (40, 40), device=device())
+
+    def at(point: tuple[float, float, float]) -> str | None:
+        (place,), _ = scene.camera.project(np.array([point]), 1.0)
+        return session.pick_point((float(place[0]), float(place[1])))
+
+    assert at((0.5, 0.1, 0)) == "ball" and at((-0.5, 0.1, 0)) == "pane" and at((0, 0, 0)) == "behind"
+    session.edit(scene.with_light("pane", camera_visible=False).with_object("behind", position=(0, 0, 1.5)))
+    assert at((-0.5, 0.1, 0)) == at((0.5, 0.1, 0)) == "behind"
+    session.edit(replace(scene, objects=()).with_light("pane", rotation=(0, 0, 0)))
+    towards_sun = np.array(scene.camera.position) + 9 * sun.axes[2]
+    assert at((-0.5, 0.1, 0)) is None and at(tuple(towards_sun.tolist())) == "sun"

@@ -1,4 +1,4 @@
-"""Commands on the objects of the scene."""
+"""Commands on the objects and lights of the scene."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from incpt.ui.editor.editor import Editor
 
 
 def select_all(editor: Editor) -> None:
-    """Select every object that is shown."""
+    """Select every object and light that is shown."""
     editor.select(Selection.all_of(editor.scene))
 
 
@@ -18,6 +18,12 @@ def add_shape(editor: Editor, shape: str) -> None:
     """A new object of that shape, selected."""
     scene, names = edits.add_shape(editor.scene, shape)
     editor.propose(scene, f"Add {shape}", selection=Selection(names))
+
+
+def add_light(editor: Editor, kind: str) -> None:
+    """A new light of that kind, selected."""
+    scene, names = edits.add_light(editor.scene, kind)
+    editor.propose(scene, f"Add {edits.LIGHT_NAMES[kind]}", selection=Selection(names))
 
 
 def duplicate(editor: Editor) -> None:
@@ -41,7 +47,11 @@ def rename(editor: Editor) -> None:
 def rename_to(editor: Editor, old: str, new_name: str) -> None:
     """Give an object another name."""
     scene = edits.rename(editor.scene, old, new_name)
-    given = scene.objects[editor.scene.object_index[old]].name
+    before = editor.scene
+    if old in before.light_index:
+        given = scene.lights[before.light_index[old]].name
+    else:
+        given = scene.objects[before.object_index[old]].name
     editor.propose(scene, "Rename", selection=editor.selection.renamed(old, given))
 
 
@@ -51,8 +61,9 @@ def hide(editor: Editor) -> None:
 
 
 def show_all(editor: Editor) -> None:
-    """Show every hidden object."""
-    hidden = tuple(o.name for o in editor.scene.objects if not o.visible)
+    """Show every hidden object and light."""
+    scene = editor.scene
+    hidden = tuple(one.name for one in scene.everything if not one.visible)
     editor.propose(edits.set_visible(editor.scene, hidden, True), "Show all")
 
 
@@ -60,5 +71,5 @@ def reset_transform(editor: Editor) -> None:
     """The selected objects at the origin, unturned, at their mesh's own size."""
     scene = editor.scene
     for name in editor.selection.names:
-        scene = scene.with_object(name, transform=IDENTITY)
+        scene = scene.with_placed(name, transform=IDENTITY)
     editor.propose(scene, "Reset transform")

@@ -10,6 +10,7 @@ from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
+from incpt.scene.edits import LIGHT_NAMES
 from incpt.scene.shapes import SHAPES
 from incpt.ui.commands import camera, files, objects, pictures, rendering
 from incpt.ui.commands.command import Action, Command, Test
@@ -27,7 +28,7 @@ def _selected(editor: Editor) -> bool:
 
 
 def _has_objects(editor: Editor) -> bool:
-    return bool(editor.scene.objects)
+    return bool(editor.scene.names)
 
 
 def _has_picture(editor: Editor) -> bool:
@@ -78,6 +79,10 @@ def _add(shape: str) -> Action:
     return lambda editor: objects.add_shape(editor, shape)
 
 
+def _add_light(kind: str) -> Action:
+    return lambda editor: objects.add_light(editor, kind)
+
+
 def _switch_space(editor: Editor) -> None:
     editor.tool = replace(editor.tool, space="local" if editor.tool.space == "world" else "world")
 
@@ -117,7 +122,7 @@ COMMANDS: tuple[Command, ...] = (
             enabled=lambda e: e.document.history.can_redo, detail=lambda e: e.document.history.redo_label,
             help="Do it again"),
     Command("Select all", "Edit", objects.select_all, "A", plain_keys="Ctrl+A", enabled=_has_objects, group=1,
-            help="Select every visible object"),
+            help="Select every visible object and light"),
     Command("Select none", "Edit", Editor.cancel, "Escape", group=1,
             help="Deselect; during a drag: give it up"),
     Command("Move", "Edit", _tool("move"), "G", plain_keys="W", group=2, checked=_uses("move"),
@@ -132,6 +137,8 @@ COMMANDS: tuple[Command, ...] = (
             checked=lambda e: e.preferences.snap.enabled, help="Move, rotate and scale in steps"),
     *(Command(shape.capitalize(), "Object/Add", _add(shape), help=f"Add a {shape} where the camera looks")
       for shape in SHAPES),
+    *(Command(name.capitalize(), "Object/Add", _add_light(kind), help=f"Add a {name} above what is looked at")
+      for kind, name in LIGHT_NAMES.items()),
     Command("Duplicate", "Object", objects.duplicate, "Shift+D", plain_keys="Ctrl+D", enabled=_selected,
             group=1, help="Copy the selected objects"),
     Command("Delete", "Object", objects.delete, "Delete", enabled=_selected, group=1,

@@ -36,7 +36,7 @@ def draw(display: DisplaySettings, refusals: Refusals) -> DisplaySettings:
     if overlay != "none":
         opacity = widgets.number("Opacity", opacity, low=0.0, high=1.0, speed=0.01, decimals=2)
     grid = widgets.checkbox("Tile grid", display.tile_grid)
-    outline = widgets.checkbox("Outline", display.outline, "Around the selection")
+    outline = widgets.checkbox("Outline", display.outline, "Around the selection, and marks of lights")
     split = widgets.checkbox("Split view", display.split, "Left: restart, right: the chosen strategy")
     return refusals.changed(
         display,

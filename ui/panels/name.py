@@ -1,4 +1,4 @@
-"""Which object the panel of the object shows."""
+"""Which object or light the panel of the object shows."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from incpt.ui.widgets import widgets
 
 def draw_hint() -> None:
     """What to do where nothing is selected."""
-    widgets.note("Select an object: click it in the picture or in the outliner.")
+    widgets.note("Select an object or a light: click it in the picture or in the outliner.")
 
 
 def draw(name: str, selected: int) -> str | None:

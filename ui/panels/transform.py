@@ -1,18 +1,21 @@
-"""Position, rotation and scale of an object."""
+"""Position, rotation and scale of an object or a light."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeVar
 
 from incpt.core.affine import Vector
-from incpt.scene.model import Object
+from incpt.scene.model import Placed
 from incpt.scene.transform import Transform
 from incpt.ui.widgets import widgets
 from incpt.ui.widgets.refusals import Refusals
 
+T = TypeVar("T", bound=Placed)
 
-def draw(obj: Object, is_uniform: bool, refusals: Refusals) -> tuple[Object, bool]:
-    """Fields for the transform; returns the object after this frame, and whether scale keeps its
+
+def draw(obj: T, is_uniform: bool, refusals: Refusals) -> tuple[T, bool]:
+    """Fields for the transform; returns the object or light after this frame, and whether scale keeps its
     proportions."""
     position = widgets.vector("Position", obj.position, speed=0.01, unit=" m", tip="World space, metres")
     obj = refusals.changed(obj, position=position)
@@ -36,7 +39,7 @@ def proportional(old: Vector, new: Vector) -> Vector:
     return new
 
 
-def _reset_buttons(obj: Object) -> Object:
+def _reset_buttons(obj: T) -> T:
     with widgets.row("Reset"):
         for i, name in enumerate(("position", "rotation", "scale")):
             if i > 0:

@@ -60,7 +60,7 @@ class Gizmo:
         """Draw the handles over the picture, which lies at `picture` in points, and return the scene after
         this frame."""
         _gizmo.begin_frame()
-        visible = tuple(name for name in names if scene.object(name).visible)
+        visible = tuple(name for name in names if scene.placed(name).visible)
         if not visible:
             self.is_using = self.is_over = False
             self._drag = None
@@ -107,14 +107,14 @@ def pivot(scene: Scene, names: tuple[str, ...], space: str) -> Matrix:
     """(4, 4) where the handles stand: the object's own matrix, without shear, which ImGuizmo would take out
     of what it returns; for several objects the mean of their positions with the axes of the active one
     (local) or of the world."""
-    active = scene.object(names[-1])
+    active = scene.placed(names[-1])
     matrix = np.eye(4)
     if len(names) == 1:
         matrix[:3] = affine.compose(active.position, active.rotation, active.scale)
     else:
         if space == "local":
             matrix[:3, :3] = affine.rotation_matrix(active.rotation)
-        matrix[:3, 3] = np.mean([scene.object(name).position for name in names], axis=0)
+        matrix[:3, 3] = np.mean([scene.placed(name).position for name in names], axis=0)
     return matrix
 
 

@@ -17,6 +17,7 @@ from incpt.ui.display.projection import split_x
 from incpt.ui.editor.state import Tool
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
 from incpt.ui.rect import Point, Rect
+from incpt.ui.viewport import light_marks
 from incpt.ui.viewport.gizmo import Gizmo
 from incpt.ui.widgets import places
 from incpt.viewer.renderer import Pick
@@ -108,6 +109,8 @@ class Viewport:
         self._is_blocked = is_blocked
         places.note_rect("picture", picture)
         outcome = Outcome(scene, selection, preferences.display)
+        if preferences.display.outline:
+            light_marks.draw(scene, selection, picture)
         outcome = self._use_gizmo(outcome, tool, preferences.snap, picture)
         outcome = self._use_bar(outcome, picture)
         outcome = self._use_mouse(outcome, preferences, picture)
@@ -263,6 +266,9 @@ def pixels_in(area: Rect[float]) -> tuple[int, int] | None:
 
 def _clicked(outcome: Outcome, at: Point, is_additive: bool, picture: Rect[float]) -> Outcome:
     if picture.contains(at):
+        light = light_marks.light_at(outcome.scene, at, picture) if outcome.display.outline else None
+        if light is not None:
+            return replace(outcome, selection=outcome.selection.clicked(light, is_additive))
         return replace(outcome, pick=Pick(picture.relative(at), is_additive))
     return outcome if is_additive else replace(outcome, selection=Selection())
 
