@@ -13,6 +13,7 @@ import numpy.typing as npt
 from incpt.core.layout import MIN_ALPHA, TextureSlot
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
+from incpt.scene.light import Light
 from incpt.scene.material import Material, texture_of
 from incpt.scene.model import Object, Scene
 from incpt.scene.texture import Bitmap, Texture
@@ -31,13 +32,14 @@ def scene_dict(
 
     `max_depth` counts segments: our `max_bounces` scattering events after the first hit have two more, one
     before it and one to the light. Passages through glass are not counted apart. Raises ValueError for a
-    material that has no counterpart.
+    material or light that has no counterpart.
     """
     shapes = {
         f"shape_{i}": mesh(obj, scene.materials[obj.material], folder / f"{i}.ply")
         for i, obj in enumerate(scene.objects)
     }
     integrator = {"type": "path", "max_depth": max_depth, "rr_depth": rr_depth}
+    shapes |= {f"light_{i}": light(one) for i, one in enumerate(scene.lights) if one.is_emissive}
     # A black environment would be given half of the light samples.
     dark = scene.environment.image is None and not any(scene.environment.radiance)
     sky = {} if dark else {"environment": emitter(scene.environment)}
@@ -124,6 +126,40 @@ def mesh(obj: Object, material: Material, path: Path) -> dict[str, Any]:
     if material.is_emissive:
         shape["emitter"] = {"type": "area", "radiance": colored(material.emission, material.emission_texture)}
     return shape
+
+
+def light(one: Light) -> dict[str, Any]:
+    """What of our lights has a counterpart. Flat ones reflect nothing, but hide what is behind them on both
+    sides there. Raises ValueError for any other."""
+    x, y, z = one.axes
+    matrix = np.eye(4)
+    # Flat lights shine along +z there.
+    matrix[:3] = np.column_stack([x * one.half_size[0], -y * one.half_size[1], -z, one.position])
+    if not (one.casts_shadows and one.camera_visible) or one.double_sided:
+        raise ValueError(f"light {one.name!r}: has no counterpart")
+    color = {"type": "rgb", "value": list(one.emitted)}
+    if not one.has_size:
+        if one.kind == "sun":
+            return {"type": "directional", "direction": (-z).tolist(), "irradiance": color}
+        if one.kind == "point":
+            return {"type": "point", "position": list(one.position), "intensity": color}
+        if one.spot_blend > 0:  # what falls off linearly with the angle there
+            raise ValueError(f"light {one.name!r}: its cone has no counterpart")
+        matrix[:3] = np.column_stack([x, -y, -z, one.position])
+        half = one.spot_angle / 2
+        return {
+            "type": "spot", "to_world": mi.ScalarTransform4f(matrix), "intensity": color,
+            "cutoff_angle": half, "beam_width": 0.9999 * half,
+        }  # fmt: skip
+    if one.kind in ("sun", "spot"):
+        raise ValueError(f"light {one.name!r}: has no counterpart")
+    emission = {
+        "emitter": {"type": "area", "radiance": color},
+        "bsdf": {"type": "diffuse", "reflectance": 0.0},
+    }
+    if one.kind in ("rectangle", "disk"):
+        return {"type": one.kind, "to_world": mi.ScalarTransform4f(matrix), **emission}
+    return {"type": "sphere", "center": list(one.position), "radius": one.half_size[0], **emission}
 
 
 def _textures(material: Material) -> list[Texture]:

@@ -285,6 +285,10 @@ VARIANTS = [
     (*LIGHTS, *RESTRICTIONS[1:2]),
     ("TRIANGLE_LIGHTS", "MEDIA", *RESTRICTIONS, "PORTABLE_LANES"),
     ("TRIANGLE_LIGHTS", "PORTABLE_LANES"),
+    ("SHAPED_LIGHTS",),
+    (*LIGHTS, "SHAPED_LIGHTS", "MEDIA", "CHANGES"),
+    (*LIGHTS[:1], "SHAPED_LIGHTS", *RESTRICTIONS[:3], "MATTE", "CHANGES"),
+    ("SHAPED_LIGHTS", "MEDIA", *RESTRICTIONS, "PORTABLE_LANES"),
     ("CHANGES",),
     (*LIGHTS, "MEDIA", "CHANGES"),
     (*LIGHTS, "MEDIA", *RESTRICTIONS, "CHANGES"),
@@ -332,7 +336,7 @@ def test_kernels_build_without_warnings(device: Device) -> None:
         if "__kernel" not in text:
             continue
         for features in variants if "LIGHT_SAMPLING" in text else [()]:
-            if file == "sample_lights" and not set(features) & set(LIGHTS):
+            if file == "sample_lights" and not set(features) & {*LIGHTS, "SHAPED_LIGHTS"}:
                 continue  # launched only where there is something to sample
             built = cl.Program(device.context, device.program_text(file, features))
             built.build(options=["-Werror"])

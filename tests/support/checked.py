@@ -20,6 +20,7 @@ from incpt.render.session import Session
 from incpt.render.wavefront import Wavefront
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
+from incpt.scene.light import Light
 from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
@@ -101,11 +102,19 @@ def frosted() -> Scene:
     return replace(scene, materials={**scene.materials, "glass": glass})
 
 
+def lamps() -> Scene:
+    """Lights of every kind, beside those of triangles and a sky, and in front of glass."""
+    kinds = ("point", "spot", "sun", "rectangle", "disk", "sphere")
+    lights = [Light(kind, kind, (0.5 * i - 1, 1, 1), (-50, 0, 0), radius=0.2) for i, kind in enumerate(kinds)]
+    return replace(mixed_scene(), lights=(*lights, Light("star", "point", (0, 1, 2), radius=0)))
+
+
 SCENES: dict[str, Any] = {
     "empty": empty_glass,
     "flat": flat_box,
     "mixed": mixed_scene,
     "frosted": frosted,
+    "lamps": lamps,
 }
 
 
@@ -128,6 +137,9 @@ def check(by: str, schedule: str, name: str) -> None:
         session.step()
         for obj in scene.objects:
             session.edit(session.scene.without_object(obj.name))
+        session.step()
+    for light in scene.lights[:2]:
+        session.edit(session.scene.without_light(light.name))
         session.step()
     session.pass_image("albedo")
 

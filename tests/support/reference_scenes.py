@@ -12,6 +12,7 @@ from incpt.benchmarks.kit.scenes import cube, lamp, matte, metal, plane
 from incpt.formats.images import load_image
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
+from incpt.scene.light import Light
 from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
@@ -191,6 +192,28 @@ def embossed() -> Scene:
     return Scene(Camera((0, 1.2, 3.4), (0, 0.5, 0), fov_y=40), sky, materials, objects)
 
 
+def lights() -> Scene:
+    """Lights of their own over matte and metal bodies in a corner: ball, rectangle, disk, point, spot and
+    sun."""
+    materials = {"wall": matte(0.6, 0.6, 0.6), "block": matte(0.7, 0.3, 0.2), "metal": metal(0.3)}
+    objects = (
+        plane("floor", "wall", (0, 0, 0), (0, 0, 0), (4, 1, 4)),
+        plane("back", "wall", (0, 1.5, -1.5), (90, 0, 0), (4, 1, 3)),
+        cube("block", "block", (-0.7, 0.4, 0), (0, 25, 0), (0.5, 0.8, 0.5)),
+        cube("plate", "metal", (0.6, 0.3, 0.2), (25, -30, 0), (1, 0.05, 0.8)),
+    )
+    lamps = (
+        Light("ball", "sphere", (0.1, 0.6, -0.5), radius=0.25, radiance=2, color=(1, 0.6, 0.4)),
+        Light("pane", "rectangle", (-1.2, 1.6, -1.499), (0, 180, 0), size=(0.8, 0.5), power=8),
+        Light("disk", "disk", (1.2, 1.5, -1.499), (0, 180, 10), radius=0.3, power=4, color=(0.5, 0.7, 1)),
+        Light("point", "point", (0.4, 1.2, 0.6), radius=0, power=4, color=(1, 1, 0.5)),
+        Light("spot", "spot", (-0.5, 2, 1), (-60, 10, 0), radius=0, spot_angle=50, spot_blend=0, power=3),
+        Light("sun", "sun", rotation=(-50, 40, 0), angle=0, irradiance=0.7),
+    )
+    camera = Camera((0.2, 1.4, 3.6), (0, 0.7, 0), fov_y=42)
+    return Scene(camera, Environment(), materials, objects, lights=lamps)
+
+
 REFERENCES = {
     "cornell": Reference(cornell, 3),
     "glass": Reference(glass, 20),
@@ -199,4 +222,5 @@ REFERENCES = {
     "frosted": Reference(frosted, 20),
     "textured": Reference(textured, 3),
     "embossed": Reference(embossed, 3),
+    "lights": Reference(lights, 3),
 }
