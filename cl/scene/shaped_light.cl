@@ -213,7 +213,8 @@ INLINE int may_be_met(uint flags, int from_camera, float bsdf_pdf) {
     return ((flags & never) == 0u) & (((flags & SHAPED_SHADOWLESS) == 0u) | (bsdf_pdf <= 0.0f));
 }
 
-// The distance in which a ray meets a light's shining side; INFINITY: it does not.
+// The distance in which a ray meets a light's shining side; INFINITY: it does not. From outside of its cone the
+// ball of a spot is not there, where it would be a black one.
 INLINE float distance_to_shaped_light(const ShapedLight *light, Ray ray) {
     Vec3 to_center = subtract(light->center, ray.origin);
     float to_ball = distance_to_ball(to_center, light->half_x, ray.direction);
@@ -223,6 +224,7 @@ INLINE float distance_to_shaped_light(const ShapedLight *light, Ray ray) {
     float x = dot(from_center, light->x) / light->half_x, y = dot(from_center, light->y) / light->half_y;
     int inside = has_flag(light, SHAPED_DISK) ? x * x + y * y <= 1.0f : (FABS(x) <= 1.0f) & (FABS(y) <= 1.0f);
     int front = (facing > 1e-7f) | (has_flag(light, SHAPED_DOUBLE_SIDED) & (facing < -1e-7f));
+    to_ball = facing > light->cone_outer ? to_ball : -1.0f;
     float distance = has_flag(light, SHAPED_BALL) ? to_ball : (inside & front ? along_ray : -1.0f);
     return distance > 0.0f ? distance : INFINITY;
 }

@@ -317,6 +317,8 @@ def _distance_to(light: Light, origin: npt.NDArray[np.float64], direction: npt.N
         middle = float(to_center @ direction)
         chord2 = light.half_size[0] ** 2 - float(((to_center - middle * direction) ** 2).sum())
         distance = middle - math.sqrt(max(chord2, 0.0))
+        if light.kind == "spot" and direction @ z <= light.cone[1]:
+            return math.nan
         return distance if chord2 >= 0 and distance > 0 else math.nan
     facing = float(direction @ z)
     if facing == 0 or (facing < 0 and not light.double_sided):

@@ -28,7 +28,7 @@ LIGHTS = {
     "disk": Light("l", "disk", (0.2, 1, 0.3), (-100, 0, 0), (1.2, 0.8, 1), radius=1.3),
     "ball": Light("l", "sphere", (1, 0.8, -0.4), radius=0.9),
     "near ball": Light("l", "point", (0, 1, 0), radius=0.999),
-    "spot": Light("l", "spot", (1, 0.8, -0.4), (-90, 0, 0), radius=0.6, spot_angle=170),
+    "spot": Light("l", "spot", (0.5, 0.9, -0.4), (-90, 0, 0), radius=0.6, spot_angle=179),
     "sun": Light("l", "sun", rotation=(-40, 20, 0), angle=60),
 }
 

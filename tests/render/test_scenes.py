@@ -16,11 +16,12 @@ from incpt.formats.registry import load
 from incpt.picture.tone_mapping import tone_map
 from incpt.render.session import Session
 from incpt.scene.change import diff
+from incpt.scene.light import KINDS
 from incpt.scene.model import Scene
 from incpt.scenes import make_city
 
 FOLDER = Path(str(resources.files("incpt.scenes")))
-NAMES = ("editing", "nested_dielectrics", "cornell", "mis", "bunny", "city", "textured")
+NAMES = ("editing", "nested_dielectrics", "cornell", "mis", "bunny", "city", "textured", "lamps")
 FLOOR_TOLERANCE = 0.01
 """Metres that an object may stand above or in its floor."""
 
@@ -157,11 +158,14 @@ def test_lights_of_mis_have_equal_power(scenes: dict[str, Scene]) -> None:
     scene = scenes["mis"]
     plates = [scene.material(f"plate {i}").roughness for i in range(1, 5)]
     assert plates == sorted(plates) and plates[-1] > 4 * plates[0]
-    lights = [scene.object(f"light {i}") for i in range(1, 5)]
-    weights = np.array([0.2126, 0.7152, 0.0722])
-    powers = [weights @ scene.material(o.material).emission * o.scale[0] ** 2 for o in lights]
-    assert lights[-1].scale[0] > 20 * lights[0].scale[0]
+    lights = [scene.light(f"light {i}") for i in range(1, 5)]
+    powers = [np.array([0.2126, 0.7152, 0.0722]) @ light.watts for light in lights]
+    assert lights[-1].radius > 20 * lights[0].radius
     np.testing.assert_allclose(powers, powers[0], rtol=0.01)
+
+
+def test_lamps_has_every_kind(scenes: dict[str, Scene]) -> None:
+    assert {light.kind for light in scenes["lamps"].lights} == set(KINDS)
 
 
 def test_city_is_large(scenes: dict[str, Scene]) -> None:
