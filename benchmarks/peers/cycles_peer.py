@@ -53,6 +53,8 @@ class CyclesPeer:
         scene = bpy.context.scene
         self._set_up(scene, job)
         materials = {name: self._material(name, m) for name, m in job.scene.materials.items()}
+        if job.scene.lights:
+            raise ValueError("lights of their own are not translated for Cycles")
         for obj in job.scene.objects:
             if not obj.visible:
                 continue

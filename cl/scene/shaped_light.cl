@@ -213,8 +213,8 @@ INLINE int may_be_met(uint flags, int from_camera, float bsdf_pdf) {
     return ((flags & never) == 0u) & (((flags & SHAPED_SHADOWLESS) == 0u) | (bsdf_pdf <= 0.0f));
 }
 
-// The distance in which a ray meets a light's shining side; INFINITY: it does not. From outside of its cone the
-// ball of a spot is not there, where it would be a black one.
+// The distance in which a ray meets a light's shining side; INFINITY: it does not. From outside of its cone
+// the ball of a spot is not there, where it would be a black one.
 INLINE float distance_to_shaped_light(const ShapedLight *light, Ray ray) {
     Vec3 to_center = subtract(light->center, ray.origin);
     float to_ball = distance_to_ball(to_center, light->half_x, ray.direction);
