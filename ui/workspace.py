@@ -97,7 +97,7 @@ class Workspace:
             if is_open:
                 new, self._is_uniform = transform.draw(one, self._is_uniform, refusals)
                 if new is not one:
-                    editor.propose(editor.scene.with_all({name: new}), "Transform", _key())
+                    editor.propose(edits.with_all(editor.scene, {name: new}), "Transform", _key())
         if name in editor.scene.light_index:
             _draw_light(editor, name, refusals)
         else:
@@ -191,7 +191,7 @@ def _draw_light(editor: Editor, name: str, refusals: Refusals) -> None:
             light = editor.scene.light(name)
             new = light_panel.draw(light, refusals)
             if new is not light:
-                editor.propose(editor.scene.with_all({name: new}), f"Light {name}", _key())
+                editor.propose(edits.with_all(editor.scene, {name: new}), f"Light {name}", _key())
 
 
 def _draw_notices(editor: Editor, area: Rect[float]) -> None:

@@ -70,14 +70,9 @@ __kernel void touch_rays(LAUNCH_PARAMETERS, LIST_PARAMETERS, PATH_STATE_PARAMETE
     const State state = STATE_OF(params);
     const Changes changes = {CHANGES_ARGUMENTS};
     const Surface surface = load_surface(&state, path);
-#ifdef SHAPED_LIGHTS
-    const float limit = surface.distance; // also of those that end on a light
-#else
-    const float limit = surface.object == NO_INDEX ? INFINITY : surface.distance;
-#endif
     const Ray ray = load_ray(rays, state.stride, path);
     touch(&changes, params.first_path + path,
-          crosses_any_box(&changes.change, ray, limit) | is_changed(&changes, surface.object));
+          crosses_any_box(&changes.change, ray, surface.distance) | is_changed(&changes, surface.object));
 }
 
 // For paths whose shadow rays are going to be traced.

@@ -41,16 +41,17 @@ __kernel __attribute__((vec_type_hint(float8))) void intersect(LAUNCH_PARAMETERS
     const Emitters emitters = {EMITTERS_ARGUMENTS};
     float distance = met ? hit.distance : INFINITY;
     const uint light = nearest_light(&params, &emitters, &state, path, &distance);
-    surfaces[SURFACE_DISTANCE * state.stride + path] = distance;
     if (light != NO_INDEX) {
         shade_light_path(&params, &shading, &emitters, &state, path, params.first_path + path, light,
                          distance);
+        surfaces[SURFACE_DISTANCE * state.stride + path] = distance;
         store_bits(surfaces, SURFACE_OBJECT * state.stride + path, NO_INDEX);
         store_class(&state, path, 0u);
         return;
     }
 #endif
     if (!met) {
+        surfaces[SURFACE_DISTANCE * state.stride + path] = INFINITY;
         store_bits(surfaces, SURFACE_OBJECT * state.stride + path, NO_INDEX);
         store_class(&state, path, CLASS_MISS);
         return;

@@ -1,5 +1,7 @@
 #include "path/state.cl"
-#include "scene/light.cl"
+#ifdef SHAPED_LIGHTS
+#include "scene/shaped_light.cl"
+#endif
 
 // What happens where a ray ends on a light that is an object of its own, or goes on to a sun.
 
@@ -49,15 +51,5 @@ INLINE uint nearest_light(const Params *params, const Emitters *emitters, const 
         }
     }
     return nearest;
-}
-
-// Whether a light is in the way of a shadow ray.
-INLINE bool any_light_shades(const Params *params, const Emitters *emitters, Ray ray, float limit) {
-    for (uint i = params->sun_count; i < params->shaped_count; i++) {
-        const ShapedLight light = load_shaped_light(params, emitters, i);
-        if (shaped_light_shades(&light, ray, limit))
-            return true;
-    }
-    return false;
 }
 #endif

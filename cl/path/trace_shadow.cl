@@ -1,6 +1,8 @@
 #include "path/coverage.cl"
 #include "path/trace.cl"
-#include "path/shade_light.cl"
+#ifdef SHAPED_LIGHTS
+#include "scene/shaped_light.cl"
+#endif
 
 // Traces shadow rays, and adds the radiance of those that nothing is in the way of to what paths have
 // gathered. The hint keeps compilers from making SIMD lanes of work-items, as Intel's would: the lanes are

@@ -136,7 +136,7 @@ INLINE float flat_area(const ShapedLight *light) {
 
 // The density per solid angle with which a direction to a light is chosen that meets it in `distance`.
 INLINE float shaped_light_pdf(const ShapedLight *light, Vec3 to_center, Vec3 direction, float distance) {
-    int round = has_flag(light, SHAPED_BALL | SHAPED_SUN);
+    int is_round = has_flag(light, SHAPED_BALL | SHAPED_SUN);
     float cap =
         has_flag(light, SHAPED_SUN) ? light->cap : cap_of_ball(light->half_x, dot(to_center, to_center));
     SeenRectangle seen = seen_rectangle(light, to_center);
@@ -145,7 +145,7 @@ INLINE float shaped_light_pdf(const ShapedLight *light, Vec3 to_center, Vec3 dir
     float by_area = distance * distance / (facing * flat_area(light));
     int by_angle = has_flag(light, SHAPED_RECTANGLE) & (solid_angle > LEAST_SOLID_ANGLE);
     float flat = by_angle ? 1.0f / MAX(solid_angle, LEAST_SOLID_ANGLE) : by_area;
-    return light->probability * (round ? 1.0f / (2.0f * PI * MAX(cap, 1e-37f)) : flat);
+    return light->probability * (is_round ? 1.0f / (2.0f * PI * MAX(cap, 1e-37f)) : flat);
 }
 
 // Of a distance to a light, by how much surfaces in its own plane count as behind it.
@@ -169,7 +169,7 @@ INLINE LightSample sample_shaped_light(const Params *params, const Emitters *emi
     sincos_turns(uv.v, &sine, &cosine);
     float aside = SQRT(MAX(height * (2.0f - height), 0.0f));
     Vec3 in_cone = from_local(frame_of(center_direction), vec3(aside * cosine, aside * sine, 1.0f - height));
-    int round = sun | ball;
+    int is_round = sun | ball;
     float chord = SQRT(MAX(light.half_x * light.half_x - squared * aside * aside, 0.0f));
     float round_distance = point ? length : MAX(length * (1.0f - height) - chord, 0.0f);
 
@@ -189,11 +189,11 @@ INLINE LightSample sample_shaped_light(const Params *params, const Emitters *emi
     Vec3 to_flat = scale(1.0f / MAX(flat_distance, 1e-30f), to_point);
 
     LightSample result;
-    result.direction = select(round, in_cone, to_flat);
-    float distance = round ? round_distance : flat_distance;
+    result.direction = select(is_round, in_cone, to_flat);
+    float distance = is_round ? round_distance : flat_distance;
     float facing = dot(light.z, result.direction);
     int front = has_flag(&light, SHAPED_DOUBLE_SIDED) ? FABS(facing) > 1e-7f : facing > 1e-7f;
-    int valid = round ? sun | (point ? squared > 0.0f : cap < 1.0f) : front & (flat_squared > 0.0f);
+    int valid = is_round ? sun | (point ? squared > 0.0f : cap < 1.0f) : front & (flat_squared > 0.0f);
     Vec3 emission = shaped_emission(&light, result.direction);
     float spread = (point & !sun) ? 1.0f / MAX(squared, 1e-37f) : 1.0f;
     float pdf = point ? light.probability : shaped_light_pdf(&light, to_center, result.direction, distance);
@@ -237,6 +237,16 @@ INLINE float distance_to_shaped_light(const ShapedLight *light, Ray ray) {
 INLINE int shaped_light_shades(const ShapedLight *light, Ray ray, float limit) {
     return may_be_met(light->flags, 0, 1.0f) &
            (distance_to_shaped_light(light, ray) < limit * (1.0f - LIGHT_CLEAR));
+}
+
+// Whether any light is.
+INLINE bool any_light_shades(const Params *params, const Emitters *emitters, Ray ray, float limit) {
+    for (uint i = params->sun_count; i < params->shaped_count; i++) {
+        const ShapedLight light = load_shaped_light(params, emitters, i);
+        if (shaped_light_shades(&light, ray, limit))
+            return true;
+    }
+    return false;
 }
 
 // Radiance that a light sends to the origin of a ray that has met it, weighted against light sampling.

@@ -112,9 +112,9 @@ class SurfacePlane(IntEnum):
     The geometric normal follows the winding of the face; the shading normal lies on its side.
     OFFSET bounds the rounding error of POSITION along the geometric normal: a ray that leaves the surface
     starts that far along it. It is 0 where there is no such error. FACE counts in the mesh. After `intersect`
-    OBJECT is NO_INDEX (as uint) where the ray left the scene. WEIGHT_B and WEIGHT_C are the barycentric
-    weights of the second and third corner, for what meshes have at corners; only scenes with textures have
-    them.
+    OBJECT is NO_INDEX (as uint) and DISTANCE infinity where the ray left the scene; OBJECT too where it ends
+    on a light. WEIGHT_B and WEIGHT_C are the barycentric weights of the second and third corner, for what
+    meshes have at corners; only scenes with textures have them.
     """
 
     GEOMETRIC_X = 0

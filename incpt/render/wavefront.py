@@ -40,11 +40,13 @@ _PLANES = {
 }
 _CLASSES = {path_list: PathClass[path_list.name] for path_list in PathList}
 """Which paths are in which list."""
-_LIGHTS = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS", "SHAPED_LIGHTS")
+_SHAPED = "SHAPED_LIGHTS"
+_LIGHTS = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS", _SHAPED)
 _TEXTURES = ("TEXTURES", "VERTEX_COLORS")
+_TRACED = (*_TEXTURES, "CUTOUTS")
+"""Of first hits, which pass through lights."""
 _FEATURES: Mapping[str | None, tuple[str, ...]] = {
-    "intersect": (*_TEXTURES, "CUTOUTS", "SHAPED_LIGHTS"),
-    "touch_rays": ("SHAPED_LIGHTS",),
+    "intersect": (*_TRACED, _SHAPED, "MEDIA"),
     "shade_miss": (*_LIGHTS, "MEDIA"),
     "sample_lights": (*_LIGHTS, *_TEXTURES),
     "touch_lights": (*_LIGHTS, *_TEXTURES),
@@ -52,7 +54,7 @@ _FEATURES: Mapping[str | None, tuple[str, ...]] = {
     "shade": (*_LIGHTS, *_TEXTURES),
     "write_aovs": _TEXTURES,
     "first_hits": _TEXTURES,
-    "trace_shadow": (*_TEXTURES, "CUTOUTS", "SHAPED_LIGHTS"),
+    "trace_shadow": (*_TRACED, _SHAPED),
 }
 """The features of a scene without which a kernel would leave something out. Those that would only make it
 quicker, as they do blocks, would be more variants to build."""
@@ -127,7 +129,7 @@ class Wavefront:
         chunk = self._chunk(batch, 0, 0)
         kernels = dict.fromkeys((one.kernel, one.features) for one in chunk.launches)
         # First hits need it too.
-        kernels.pop(("intersect", _chosen(batch.features, _FEATURES["intersect"])), None)
+        kernels.pop(("intersect", _chosen(batch.features, _TRACED)), None)
         return [
             *self.idle_first_hits(batch),
             *self._idle(
@@ -205,7 +207,7 @@ class Wavefront:
 
     def _intersect(self, chunk: _Chunk, size: int) -> None:
         """Trace the camera rays of a chunk."""
-        features = _chosen(chunk.batch.features, _FEATURES["intersect"])
+        features = _chosen(chunk.batch.features, _TRACED)
         self._launch_listed("intersect", chunk, 0, size, PathList.LIVE, features)
 
     def _first_hits(self, chunk: _Chunk, surface: cl.Buffer, object_ids: cl.Buffer) -> None:
@@ -275,7 +277,10 @@ def _features_of(stage: Stage, features: tuple[str, ...]) -> tuple[str, ...]:
     """Those that choose the variant of the stage's kernel."""
     if When.ENDS in stage.when:
         return ("EMISSION_ONLY", *_chosen(features, _TEXTURES))
-    return _chosen(features, _FEATURES.get(stage.kernel, ()))
+    names = _FEATURES.get(stage.kernel, ())
+    if stage.kernel == "intersect" and _SHAPED not in features:
+        names = _TRACED
+    return _chosen(features, names)
 
 
 def _chosen(features: tuple[str, ...], names: tuple[str, ...]) -> tuple[str, ...]:

@@ -156,6 +156,16 @@ def assign_material(scene: Scene, names: Iterable[str], material: str) -> Scene:
     return _with_each(scene, objects, {"material": material})
 
 
+def with_all(scene: Scene, placed: Mapping[str, Placed]) -> Scene:
+    """The scene with these in place of the objects and lights of their keys. Raises InputError."""
+    changes: dict[str, Any] = {}
+    if not placed.keys().isdisjoint(scene.object_index):
+        changes["objects"] = tuple(placed.get(one.name, one) for one in scene.objects)
+    if not placed.keys().isdisjoint(scene.light_index):
+        changes["lights"] = tuple(placed.get(one.name, one) for one in scene.lights)
+    return replace(scene, **changes)
+
+
 def bounds_of(scene: Scene, names: Collection[str] = ()) -> npt.NDArray[np.float64] | None:
     """(2, 3) bounds in world space of the named objects and lights, or of all that are shown, suns left out;
     None without any.
@@ -196,7 +206,7 @@ def transform_objects(
         linear = matrix[:3, :3] @ world[:, :3]
         position = matrix[:3, :3] @ (world[:, 3] - about) + about + matrix[:3, 3]
         changed[name] = _moved(one, np.column_stack([linear, position]), matrix[:3, :3])
-    return scene.with_all(changed)
+    return with_all(scene, changed)
 
 
 # -------------------------------------------------------------------------------------------- materials

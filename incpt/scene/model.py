@@ -257,15 +257,6 @@ class Scene:
         is_light = isinstance(name, str) and name in self.light_index
         return self.with_light(name, **changes) if is_light else self.with_object(name, **changes)
 
-    def with_all(self, placed: Mapping[str, Placed]) -> Scene:
-        """A scene with these in place of the objects and lights of their keys. Raises InputError."""
-        changes: dict[str, Any] = {}
-        if not placed.keys().isdisjoint(self.object_index):
-            changes["objects"] = tuple(placed.get(one.name, one) for one in self.objects)
-        if not placed.keys().isdisjoint(self.light_index):
-            changes["lights"] = tuple(placed.get(one.name, one) for one in self.lights)
-        return replace(self, **changes)
-
     def with_added_light(self, *lights: Light) -> Scene:
         """A scene with more lights."""
         return replace(self, lights=(*self.lights, *lights))

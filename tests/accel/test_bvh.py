@@ -91,6 +91,7 @@ class World:
         tables |= {
             a.name: np.zeros(1, np.float32) for a in bindings.SHADING.arguments if a.name not in tables
         }
+        tables |= {argument.name: np.zeros(1, np.float32) for argument in bindings.EMITTERS.arguments}
         self.buffers = {name: self.device.upload(table) for name, table in tables.items()}
 
     def _launch(self, name: str, count: int, planes: dict[str, Floats]) -> dict[str, Floats]:

@@ -328,3 +328,32 @@ def test_lights_are_picked_where_they_are_seen() -> None:
     session.edit(replace(scene, objects=()).with_light("pane", rotation=(0, 0, 0)))
     towards_sun = np.array(scene.camera.position) + 9 * sun.axes[2]
     assert at((-0.5, 0.1, 0)) is None and at(tuple(towards_sun.tolist())) == "sun"
+
+
+@pytest.mark.parametrize("in_blocks", [False, True], ids=["wavefront", "blocks"])
+@pytest.mark.parametrize(
+    "light",
+    [
+        Light("l", "sphere", (0, 0, 0.5), radius=0.5, radiance=3),
+        Light("l", "rectangle", rotation=(0, 180, 0), size=(3, 3), radiance=3),
+    ],
+    ids=lambda light: light.kind,
+)
+def test_media_absorb_what_lights_send(light: Light, in_blocks: bool) -> None:
+    """A metre and two or three on the way through a fog without refraction, to the light itself, and from it to
+    a wall."""
+    if in_blocks and not traces_in_blocks(device()):
+        pytest.skip("no blocks on this device")
+    fog = Material((1, 1, 1), roughness=0, ior=1.0, transmission=1, absorption=(0.5, 0, 1))
+    scene = camera_at(light).with_material("fog", **vars(fog))
+    scene = scene.with_added(Object("fog", shape("cube"), "fog", scale=(9, 9, 9)))
+    settings = RenderSettings(max_bounces=0, base_nor=8)
+    session = Session(scene, (32, 32), settings, device())
+    session._tracer = session._tracer if in_blocks else Wavefront(device())
+    session.render(8)
+    distance = 2.0 if light.kind == "sphere" else 3.0
+    np.testing.assert_allclose(
+        session.image()[14:18, 14:18].mean(axis=(0, 1)),
+        3 * np.exp(-distance * np.array([0.5, 0, 1])),
+        rtol=0.01,
+    )

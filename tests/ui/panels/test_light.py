@@ -1,4 +1,4 @@
-"""Lights in the editor: their panel, the outliner, the menu that adds them, and their marks in the picture."""
+"""Lights in the editor: their panel, the outliner, the menu that adds them, their marks in the picture."""
 
 from __future__ import annotations
 
