@@ -414,6 +414,8 @@ STAGE void shade_by_lights(const Block *block, const BlockRay *ray) {
     const uint count = ray->count;
     for (uint k = block->params->sun_count; k < block->params->shaped_count; k++) {
         const ShapedLight light = load_shaped_light(block->params, &block->emitters, k);
+        if (!may_shade(light.flags))
+            continue;
         LANES
         for (int i = 0; i < (int)count; i++) {
             uint path_class = load_class(state, i);

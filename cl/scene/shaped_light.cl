@@ -233,15 +233,19 @@ INLINE float distance_to_shaped_light(const ShapedLight *light, Ray ray) {
 // The light itself is never found there.
 #define LIGHT_CLEAR 1e-4f
 
-// Whether a light is in the way of a shadow ray of that length.
+// Whether a light may be in the way of a shadow ray at all.
+INLINE int may_shade(uint flags) { return may_be_met(flags, 0, 1.0f); }
+
+// Whether a light that may be is in the way of a shadow ray of that length.
 INLINE int shaped_light_shades(const ShapedLight *light, Ray ray, float limit) {
-    return may_be_met(light->flags, 0, 1.0f) &
-           (distance_to_shaped_light(light, ray) < limit * (1.0f - LIGHT_CLEAR));
+    return distance_to_shaped_light(light, ray) < limit * (1.0f - LIGHT_CLEAR);
 }
 
 // Whether any light is.
 INLINE bool any_light_shades(const Params *params, const Emitters *emitters, Ray ray, float limit) {
     for (uint i = params->sun_count; i < params->shaped_count; i++) {
+        if (!may_shade(shaped_flags(params, emitters, i)))
+            continue;
         const ShapedLight light = load_shaped_light(params, emitters, i);
         if (shaped_light_shades(&light, ray, limit))
             return true;

@@ -16,7 +16,7 @@ from incpt.tables.alias import alias_table, luminance
 
 Array = npt.NDArray[np.float64]
 
-SUN_RADIUS = 5.0
+SUN_RADIUS = 3.0
 """Metres. A sun counts as a lamp with the power that it sends into a scene of that radius."""
 EVEN_SHARE = 0.5
 """Of the choices among lights, how many take each of them alike, whatever its power: a weak lamp that is
