@@ -340,8 +340,7 @@ def test_lights_are_picked_where_they_are_seen() -> None:
     ids=lambda light: light.kind,
 )
 def test_media_absorb_what_lights_send(light: Light, in_blocks: bool) -> None:
-    """A metre and two or three on the way through a fog without refraction, to the light itself, and from it to
-    a wall."""
+    """Two or three metres through a fog without refraction, straight to the light."""
     if in_blocks and not traces_in_blocks(device()):
         pytest.skip("no blocks on this device")
     fog = Material((1, 1, 1), roughness=0, ior=1.0, transmission=1, absorption=(0.5, 0, 1))

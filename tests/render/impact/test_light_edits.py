@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
 from support.pairs import check, traced_pairs
 from support.renders import assert_same_mean, repeat
 from support.small_scenes import mixed_scene
@@ -174,12 +177,75 @@ def test_edits_then_convergence_equal_a_fresh_render(name: str, device: Device) 
     session.edit(new)
     assert session.mode is Mode.INCREMENTAL
     session.step()
+    assert_converges(session, new)
+
+
+def assert_converges(session: Session, scene: Scene) -> None:
+    """The picture becomes that of fresh renders with other random numbers, within their noise."""
     session.render(256)
-    fresh = repeat(new, 128, 4, size=(20, 14), max_bounces=3)
+    fresh = repeat(replace(scene), 128, 4, size=session.size, max_bounces=3)
     noise = np.sqrt(fresh.var(axis=0, ddof=1).mean())
     difference = session.image() - fresh.mean(axis=0)
     assert np.sqrt((difference**2).mean()) < 1.5 * noise
     assert abs(difference.mean()) < 6 * noise / np.sqrt(difference.size)
+
+
+unit = st.floats(0, 1)
+places = st.tuples(st.floats(-1.2, 1.2), st.floats(0.3, 2.2), st.floats(-0.5, 1.5))
+changes = st.one_of(
+    st.fixed_dictionaries({"position": places}),
+    st.fixed_dictionaries({"rotation": st.tuples(*[st.floats(-180, 180)] * 3)}),
+    st.fixed_dictionaries({"scale": st.tuples(*[st.floats(0.3, 2)] * 3)}),
+    st.fixed_dictionaries({"power": st.floats(0, 30)}),
+    st.fixed_dictionaries({"color": st.tuples(unit, unit, unit)}),
+    st.fixed_dictionaries({"radius": st.floats(0.05, 0.4), "size": st.tuples(*[st.floats(0.1, 1)] * 2)}),
+    st.fixed_dictionaries({"spot_angle": st.floats(10, 170), "spot_blend": unit}),
+    st.fixed_dictionaries({"kind": st.sampled_from(["point", "spot", "rectangle", "disk", "sphere"])}),
+    st.fixed_dictionaries(
+        {name: st.booleans() for name in ("visible", "camera_visible", "casts_shadows", "double_sided")}
+    ),
+)
+light_edits = st.builds(
+    lambda name, values: lambda s: s.with_light(name, **values) if name in s.light_index else s,
+    st.sampled_from(["bulb", "pane", "disk", "spot"]),
+    changes,
+)
+comings = st.builds(
+    lambda at: lambda s: s.with_added_light(replace(NEW, name=f"new {len(s.lights)}", position=at)), places
+)
+goings = st.builds(
+    lambda name: lambda s: s.without_light(name) if name in s.light_index else s,
+    st.sampled_from(["bulb", "pane"]),
+)
+moves = st.builds(lambda at: lambda s: s.with_object("red cube", position=at), places)
+
+
+@pytest.mark.slow
+@hypothesis_settings(
+    max_examples=8,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+@given(
+    st.lists(
+        st.tuples(st.one_of(light_edits, light_edits, comings, goings, moves), st.integers(0, 4)),
+        min_size=1,
+        max_size=4,
+    )
+)
+def test_any_edits_then_convergence_equal_a_fresh_render(
+    device: Device, sequence: list[tuple[Callable[[Scene], Scene], int]]
+) -> None:
+    scene = mixed().with_light("star", power=1.0)
+    settings = replace(SMALL, size=(20, 14), base_nor=16, strategy="impact")
+    session = Session(scene, settings=settings, device=device)
+    session.render(16)
+    for edit, steps in sequence:
+        scene = edit(scene)
+        session.edit(scene)
+        for _ in range(steps):
+            session.step()
+    assert_converges(session, scene)
 
 
 def test_edits_of_suns_start_over(device: Device) -> None:
