@@ -137,6 +137,8 @@ class CyclesPeer:
     def _place_camera(self, scene: Any, camera: Camera) -> None:
         from mathutils import Matrix
 
+        if camera != Camera(camera.position, camera.target, camera.up, camera.fov_y):
+            raise ValueError(f"{camera}: only plain pinholes are compared with Cycles")
         lens = self._bpy.data.cameras.new("camera")
         lens.sensor_fit = "VERTICAL"
         lens.angle = math.radians(camera.fov_y)

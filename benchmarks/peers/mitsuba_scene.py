@@ -226,13 +226,31 @@ def emitter(environment: Environment) -> dict[str, Any]:
 
 
 def sensor(camera: Camera, size: tuple[int, int]) -> dict[str, Any]:
-    """A pinhole with a box filter as wide as a pixel."""
+    """The camera with a box filter as wide as a pixel. Raises ValueError for one that has no counterpart."""
+    width, height = size
+    aspect = width / height
+    shifted, bladed = camera.shift_x or camera.shift_y, camera.has_lens and camera.blades
+    if camera.near or bladed or (shifted and (camera.has_lens or camera.is_orthographic)):
+        raise ValueError(f"{camera} has no counterpart in Mitsuba")
     to_world = mi.ScalarTransform4f().look_at(list(camera.position), list(camera.target), list(camera.up))
     film = {
         "type": "hdrfilm", "width": size[0], "height": size[1], "rfilter": {"type": "box"},
         "pixel_format": "rgb", "component_format": "float32",
     }  # fmt: skip
+    common = {"film": film, "sampler": {"type": "independent"}}
+    if camera.is_orthographic:
+        if camera.has_lens:
+            raise ValueError(f"{camera} has no counterpart in Mitsuba")
+        half_width = camera.ortho_height * aspect / 2
+        to_world = to_world @ mi.ScalarTransform4f().scale([half_width, half_width, 1])
+        return {"type": "orthographic", "to_world": to_world, **common}
+    common |= {"to_world": to_world, "fov": camera.fov_y_at(aspect), "fov_axis": "y"}
+    if camera.has_lens:
+        radius = camera.lens_radius(aspect)
+        return {
+            "type": "thinlens", "aperture_radius": radius, "focus_distance": camera.sharp_distance, **common,
+        }  # fmt: skip
+    across, up = (shift / 2 for shift in camera.shift_at(aspect))
     return {
-        "type": "perspective", "to_world": to_world, "fov": camera.fov_y, "fov_axis": "y", "film": film,
-        "sampler": {"type": "independent"},
+        "type": "perspective", "principal_point_offset_x": across, "principal_point_offset_y": -up, **common,
     }  # fmt: skip

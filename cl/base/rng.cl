@@ -5,7 +5,8 @@
 // B. Burley, Practical Hash-based Owen Scrambling, JCGT 9(4), 2020. Any aligned power of two of samples
 // of a pixel is a (0, 2)-net in each pair of dimensions.
 
-// Pairs of dimensions: one for the place in the pixel, four for every ray of the path.
+// Pairs of dimensions: one for the place in the pixel, one for that on the lens, four for every ray
+// of the path.
 #define PAIR_PIXEL 0u
 #define PAIR_DIRECTION(ray) (1u + 4u * (ray))
 #define PAIR_LIGHT(ray) (2u + 4u * (ray))
@@ -13,6 +14,8 @@
 #define PAIR_LUCK(ray) (4u + 4u * (ray))
 // Of the surfaces that a ray and the shadow ray behind it go through.
 #define PAIR_COVERAGE(ray, layer) (5u + 4u * MOST_RAYS + MOST_LAYERS * (ray) + (layer))
+// Beyond those of all rays, so that these are the same with a lens and without.
+#define PAIR_LENS 0x80000000u
 
 typedef struct {
     float u, v;

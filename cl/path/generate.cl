@@ -1,4 +1,5 @@
 #include "scene/camera.cl"
+#include "scene/lens.cl"
 #include "base/rng.cl"
 #include "path/state.cl"
 #include "path/tile.cl"
@@ -20,10 +21,18 @@ INLINE void generate_path(const Params *params, __global const Slot *slots, cons
     uint pixel = y * params->width + x;
     Uniform2 jitter = uniform_2d(pixel_seed(pixel, params->seed), sample, PAIR_PIXEL);
     int center = params->pixel_center != 0u;
+    float image_x = (float)x + (center ? 0.5f : jitter.u), image_y = (float)y + (center ? 0.5f : jitter.v);
+#ifdef LENS
+    Uniform2 aperture =
+        sample_aperture(params, uniform_2d(pixel_seed(pixel, params->seed), sample, PAIR_LENS));
+    aperture.u = center ? 0.0f : aperture.u;
+    aperture.v = center ? 0.0f : aperture.v;
+    Ray ray = lens_ray(params, image_x, image_y, aperture);
+#else
     Ray ray;
     ray.origin = camera_position(params);
-    ray.direction = camera_direction(params, (float)x + (center ? 0.5f : jitter.u),
-                                     (float)y + (center ? 0.5f : jitter.v));
+    ray.direction = camera_direction(params, image_x, image_y);
+#endif
     Path p;
     p.throughput = vec3(1.0f, 1.0f, 1.0f);
     p.bsdf_pdf = 0.0f;

@@ -727,6 +727,14 @@ CAMERA = _packed(
         ("right", np.float32, (3,)),  # scaled so that pixel (x, y) looks along
         ("up", np.float32, (3,)),  # forward + (2 x / width - 1) right - (2 y / height - 1) up
         ("forward", np.float32, (3,)),
+        # The rest is read by the variant LENS alone; see cl/scene/lens.cl.
+        ("lens_right", np.float32, (3,)),  # the half axes of the aperture, metres
+        ("lens_up", np.float32, (3,)),
+        ("inverse_focus", np.float32),  # 1 / distance of the plane that is sharp, 1/m
+        ("near", np.float32),  # along the view, metres
+        ("orthographic", np.float32),  # 1: rays are parallel and start right and up of the position; else 0
+        ("blades", np.uint32),  # corners of the aperture; 0: it is round
+        ("blade_turns", np.float32),  # its rotation, as a fraction of a full turn
     ]
 )
 

@@ -31,6 +31,7 @@ FEATURES = {
     "PORTABLE_LANES": "Instructions of AVX-512 are not written by hand, as on processors without them.",
     "INEXACT_DIVISION": "The device does not round quotients correctly, so that boxes need more slack.",
     "PERTURBED_DIVISION": "Reciprocals of directions are two ulps off, for the tests of that slack.",
+    "LENS": "Camera rays start at different points: of a thin lens, an orthographic picture or a near plane.",
     "ENVIRONMENT_IMAGE": "The environment is an image, of which lights are sampled.",
     "TRIANGLE_LIGHTS": "There are emissive triangles, of which lights are sampled.",
     "SHAPED_LIGHTS": "There are lights that are objects of their own.",

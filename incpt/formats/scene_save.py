@@ -15,8 +15,9 @@ from incpt.core import files
 from incpt.core.checks import path_of, require
 from incpt.core.errors import InputError, InputWarning, one_line
 from incpt.formats import bitmaps, images, mesh_files, mesh_store
-from incpt.formats.scene_toml import CAMERA_KEYS, VERSION
+from incpt.formats.scene_toml import VERSION
 from incpt.formats.textures import texture_value
+from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
 from incpt.scene.image import Image
 from incpt.scene.light import STRENGTHS, Light
@@ -157,7 +158,7 @@ def _document(scene: Scene, beside: _Beside) -> str:
 
     document = tomlkit.document()
     document["version"] = VERSION
-    document["camera"] = {name: _toml(getattr(scene.camera, name)) for name in CAMERA_KEYS}
+    document["camera"] = _camera_table(scene.camera)
     document["environment"] = _environment_table(scene.environment, beside)
     render = _changed(scene.settings, beside)
     if render:
@@ -177,6 +178,11 @@ def _document(scene: Scene, beside: _Beside) -> str:
         raise InputError(
             one_line(f"scene: cannot be written as TOML ({error}); rename what is odd")
         ) from None
+
+
+def _camera_table(camera: Camera) -> dict[str, Any]:
+    plain = {name: _toml(getattr(camera, name)) for name in ("position", "target", "up", "fov_y")}
+    return {**plain, **_changed(camera)}
 
 
 def _environment_table(environment: Environment, beside: _Beside) -> dict[str, Any]:

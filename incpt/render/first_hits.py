@@ -15,9 +15,10 @@ from incpt.core import layout
 from incpt.core.settings import RenderSettings
 from incpt.render import tiles
 from incpt.render.batch import Batch
-from incpt.render.params import path_params
+from incpt.render.params import aim_at, path_params
 from incpt.render.plan import Cursor, Queue, plan_step
 from incpt.render.tracer import Tracer
+from incpt.scene.camera import Camera
 from incpt.scene.light import nearest_seen
 from incpt.tables.scene_tables import SceneTables
 
@@ -34,7 +35,7 @@ class FirstHits:
 
     object_id  (H, W) the object's place in `Scene.objects`, or -1.
     normal     (H, W, 3) shading normal, world space; 0 where there is no object.
-    depth      (H, W) distance from the camera in metres, or infinity.
+    depth      (H, W) distance from the camera in metres, or infinity; of an orthographic one from its plane.
     albedo     (H, W, 3) base colour, linear; 0 where there is no object.
     """
 
@@ -58,8 +59,7 @@ def first_hits(
     width, height = right - left, bottom - top
     # The window is a picture of its own, of a camera that looks a little aside.
     camera = params["camera"]
-    camera["forward"] += ((left + right) / whole_width - 1) * camera["right"]
-    camera["forward"] += (1 - (top + bottom) / whole_height) * camera["up"]
+    aim_at(params, (left + right) / whole_width - 1, 1 - (top + bottom) / whole_height)
     camera["right"] *= width / whole_width
     camera["up"] *= height / whole_height
     params["width"], params["height"] = width, height
@@ -70,6 +70,8 @@ def first_hits(
     plan = plan_step(grid, queue, Cursor(), grid.count, np.zeros(grid.count, np.int64))
     surface, object_ids = _traced(tracer, tables, plan.slots, params)
     surface = surface.reshape(_SURFACE_PLANES, height, width)
+    if tables.scene.camera.near > 0:
+        surface[3] += _distance_to_near(tables.scene.camera, size, (left, top, right, bottom))
     return FirstHits(
         object_ids.reshape(height, width),
         np.ascontiguousarray(np.moveaxis(surface[:3], 0, 2)),
@@ -78,20 +80,31 @@ def first_hits(
     )
 
 
+def _distance_to_near(camera: Camera, size: tuple[int, int], window: Window) -> npt.NDArray[np.float32]:
+    """(H, W) from the camera to its near plane through the pixels of a window, metres."""
+    (width, height), (left, top, right, bottom) = size, window
+    x, y = np.meshgrid(np.arange(left, right) + 0.5, np.arange(top, bottom) + 0.5)
+    _, directions = camera.rays(np.column_stack([x.ravel() / width, y.ravel() / height]), width / height)
+    lengths = np.linalg.norm(directions, axis=1).reshape(x.shape)
+    return np.asarray(camera.near * lengths, np.float32)
+
+
 def object_at(
     tracer: Tracer, tables: SceneTables, settings: RenderSettings, point: tuple[float, float]
 ) -> str | None:
     """The name of the object or light at a point (x, y) from the top left, in units of the picture, or
     None."""
     params = path_params(tables, settings)
-    camera = params["camera"]
     # The point is the centre of a picture of one pixel.
-    camera["forward"] += (2 * point[0] - 1) * camera["right"] + (1 - 2 * point[1]) * camera["up"]
+    aim_at(params, 2 * point[0] - 1, 1 - 2 * point[1])
     params["width"] = params["height"] = params["tile_size"] = 1
     surface, object_ids = _traced(tracer, tables, one_slot(), params)
     index, scene = int(object_ids[0]), tables.scene
-    ray = camera["forward"].astype(np.float64)
-    light = nearest_seen(scene.lights, scene.camera.position, ray / np.linalg.norm(ray), float(surface[3]))
+    width, height = settings.size
+    origins, directions = scene.camera.rays(np.array([point]), width / height)
+    length = float(np.linalg.norm(directions[0]))
+    depth = float(surface[3]) + scene.camera.near * length
+    light = nearest_seen(scene.lights, origins[0], directions[0] / length, depth)
     if light is not None:
         return light.name
     return scene.objects[index].name if index >= 0 else None

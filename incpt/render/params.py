@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from incpt.core import layout, stages
 from incpt.core.settings import RenderSettings
+from incpt.scene.camera import Camera
 from incpt.tables.scene_tables import SceneTables
 
 
@@ -20,14 +21,41 @@ def path_params(
     width, height = settings.size if size is None else size
     camera = tables.scene.camera
     params = np.zeros((), layout.PARAMS)
-    right, up, forward = camera.image_plane(width / height)
-    params["camera"] = (camera.position, right, up, forward)
+    _set_camera(params["camera"], camera, width / height)
     params["width"], params["height"] = width, height
     params["in_squares"] = tables.has_trees
     for name in ("tile_size", "seed", "max_bounces", "transmission_bounces", "roulette_depth",
                  "multiple_scattering"):  # fmt: skip
         params[name] = getattr(settings, name)
     return params
+
+
+def aim_at(params: npt.NDArray[np.void], x: float, y: float) -> None:
+    """Move the middle of the picture to where (x, y) was, halves of its width to the right and of its height
+    up."""
+    camera = params["camera"]
+    moved = "position" if camera["orthographic"] else "forward"
+    camera[moved] += x * camera["right"]
+    camera[moved] += y * camera["up"]
+
+
+def _set_camera(params: npt.NDArray[np.void], camera: Camera, aspect: float) -> None:
+    """Fill () layout.CAMERA for a picture of that aspect (width by height)."""
+    right, up, forward = camera.image_plane(aspect)
+    radius = camera.lens_radius(aspect)
+    for name, axis in (("right", right), ("up", up)):
+        params[name] = axis
+        params[f"lens_{name}"] = radius / np.linalg.norm(axis) * axis
+    params["position"], params["forward"] = camera.position, forward
+    params["inverse_focus"] = 1 / camera.sharp_distance
+    params["near"], params["blades"] = camera.near, camera.blades
+    params["blade_turns"] = camera.blade_rotation / 360 % 1
+    params["orthographic"] = camera.is_orthographic
+    shift_x, shift_y = camera.shift_at(aspect)
+    if shift_x or shift_y:
+        across = shift_x * right + shift_y * up
+        moved = "position" if camera.is_orthographic else "forward"
+        params[moved] = (camera.position if camera.is_orthographic else forward) + across
 
 
 def launch_params(params: npt.NDArray[np.void], tables: SceneTables) -> npt.NDArray[np.void]:

@@ -46,6 +46,7 @@ _TEXTURES = ("TEXTURES", "VERTEX_COLORS")
 _TRACED = (*_TEXTURES, "CUTOUTS")
 """Of first hits, which pass through lights."""
 _FEATURES: Mapping[str | None, tuple[str, ...]] = {
+    "generate": ("LENS",),
     "intersect": (*_TRACED, _SHAPED, "MEDIA"),
     "shade_miss": (*_LIGHTS, "MEDIA"),
     "sample_lights": (*_LIGHTS, *_TEXTURES),
@@ -201,7 +202,7 @@ class Wavefront:
 
     def _generate(self, chunk: _Chunk) -> None:
         """Start the paths of a chunk, and list those that lie in the image."""
-        self._launch("generate", chunk, chunk.size)
+        self._launch("generate", chunk, chunk.size, _chosen(chunk.batch.features, _FEATURES["generate"]))
         self.device.fill(self._lengths, 0, self._lengths.size)
         self._compact(chunk, 0, chunk.size, None, (PathList.LIVE,))
 

@@ -4,12 +4,15 @@ The camera turns like a turntable: about its `up` through the target, and up and
 Coordinates of the cursor are pixels from the top left of the picture, `size` is the picture's (width,
 height), on any screen: nothing depends on how many pixels are rendered. A move that would leave the numbers
 a scene allows is not made: the camera comes back unchanged.
+
+What an orthographic camera shows does not depend on its distance: to go nearer is to show less of the scene.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -67,22 +70,38 @@ def look(camera: Camera, dx: float, dy: float, height: float) -> Camera:
     return _with(camera, camera.position, np.asarray(camera.position) - turned * distance)
 
 
-def pan(camera: Camera, dx: float, dy: float, height: float) -> Camera:
+def pan(camera: Camera, dx: float, dy: float, size: tuple[float, float]) -> Camera:
     """Moved sideways so that what lies at the target's distance follows the cursor by (dx, dy) pixels."""
-    right, up, _ = camera.image_plane(1.0)
-    move = (dy * up - dx * right) * (2 * _distance(camera) / height)
-    return _moved(camera, move)
+    right, up, _ = camera.image_plane(size[0] / size[1])
+    distance = 1.0 if camera.is_orthographic else _distance(camera)
+    return _moved(camera, 2 * distance * (dy / size[1] * up - dx / size[0] * right))
 
 
 def zoom(camera: Camera, factor: float, cursor: tuple[float, float], size: tuple[float, float]) -> Camera:
     """At `factor` times the distance to the target, with the point under the cursor at the target's
-    distance staying under the cursor. The distance has a least value and does not fall below it."""
+    distance staying under the cursor. The distance has a least value and does not fall below it. An
+    orthographic camera shows `factor` times as much instead."""
+    if camera.is_orthographic:
+        return _zoomed_flat(camera, factor, cursor, size)
     distance = _distance(camera)
     nearest = max(NEAREST, 1e-6 * max(map(abs, camera.target)))
     new_distance = max(distance * factor, min(nearest, distance))
-    ray = _ray(camera, cursor, size)
+    _, ray = _ray(camera, cursor, size)
     position = np.asarray(camera.position) + ray * (distance - new_distance)
     return _with(camera, position, position + camera.image_plane(1.0)[2] * new_distance)
+
+
+def _zoomed_flat(
+    camera: Camera, factor: float, cursor: tuple[float, float], size: tuple[float, float]
+) -> Camera:
+    height = max(camera.ortho_height * factor, min(NEAREST, camera.ortho_height))
+    start, _ = _ray(camera, cursor, size)
+    move = (1 - height / camera.ortho_height) * (start - np.asarray(camera.position))
+    try:
+        camera = replace(camera, ortho_height=height)
+    except InputError:
+        return camera
+    return _moved(camera, move)
 
 
 def wheel(camera: Camera, notches: float, cursor: tuple[float, float], size: tuple[float, float]) -> Camera:
@@ -113,13 +132,26 @@ def frame(camera: Camera, bounds: npt.ArrayLike, aspect: float) -> Camera:
         box = np.stack([middle - NEAREST / 2, middle + NEAREST / 2])
     right, up, forward = camera.image_plane(aspect)
     offset = affine.box_corners(box) - middle
-    x = np.abs(offset @ right) / (right @ right)
-    y = np.abs(offset @ up) / (up @ up)
-    depth = offset @ forward
+    x, y, depth = offset @ right / (right @ right), offset @ up / (up @ up), offset @ forward
+    shift_x, shift_y = camera.shift_at(aspect)
+    shift = shift_x * right + shift_y * up
     # Without a clearance, a plate or a rod seen along itself would be looked at from its very edge.
     clearance = FRAME_CLEARANCE * float(np.linalg.norm(box[1] - box[0]))
-    distance = float((np.maximum(FRAME_MARGIN * np.maximum(x, y), clearance) - depth).max())
-    return _with(camera, middle - forward * distance, middle)
+    if camera.is_orthographic:
+        scale = FRAME_MARGIN * float(np.maximum(np.abs(x), np.abs(y)).max())
+        scale = max(scale, clearance / camera.ortho_height)
+        distance = max(float((clearance - depth).max()) + camera.near, _distance(camera))
+        try:
+            camera = replace(camera, ortho_height=camera.ortho_height * scale)
+        except InputError:
+            return camera
+        position = middle - forward * distance - scale * shift
+    else:
+        # The middle of a shifted picture sees what lies ahead of it and aside.
+        beside = np.maximum(np.abs(x - shift_x * depth), np.abs(y - shift_y * depth))
+        distance = float((np.maximum(FRAME_MARGIN * beside, clearance + camera.near) - depth).max())
+        position = middle - (forward + shift) * distance
+    return _with(camera, position, position + forward * distance)
 
 
 def set_view(camera: Camera, side: str) -> Camera:
@@ -137,15 +169,14 @@ def set_view(camera: Camera, side: str) -> Camera:
 
 def point_under(camera: Camera, cursor: tuple[float, float], size: tuple[float, float]) -> Vector:
     """The world point under the cursor at the target's distance, on the plane that faces the camera."""
-    point = np.asarray(camera.position) + _ray(camera, cursor, size) * _distance(camera)
-    return _vector(point)
+    start, ray = _ray(camera, cursor, size)
+    return _vector(start + ray * _distance(camera))
 
 
-def _ray(camera: Camera, cursor: tuple[float, float], size: tuple[float, float]) -> Array:
-    """Direction through a pixel, 1 long along the view."""
-    right, up, forward = camera.image_plane(size[0] / size[1])
-    ray: Array = forward + right * (2 * cursor[0] / size[0] - 1) + up * (1 - 2 * cursor[1] / size[1])
-    return ray
+def _ray(camera: Camera, cursor: tuple[float, float], size: tuple[float, float]) -> tuple[Array, Array]:
+    """Start and direction of the ray through a pixel, 1 long along the view."""
+    starts, directions = camera.rays(np.array([cursor]) / np.array(size), size[0] / size[1])
+    return starts[0], directions[0]
 
 
 def _distance(camera: Camera) -> float:
@@ -189,7 +220,7 @@ def _with(
 ) -> Camera:
     """The camera at another place, or unchanged where a scene does not allow that."""
     try:
-        return Camera(_vector(position), _vector(target), up or camera.up, camera.fov_y)
+        return replace(camera, position=_vector(position), target=_vector(target), up=up or camera.up)
     except InputError:
         return camera
 

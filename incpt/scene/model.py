@@ -218,7 +218,10 @@ class Scene:
         return self.materials[name]
 
     def with_camera(self, **changes: Any) -> Scene:
-        """A scene whose camera has other values: position, target, up, fov_y."""
+        """A scene whose camera has other values: see Camera for their names. A new `fov_y` ends a focal
+        length, unless one is given too."""
+        if "fov_y" in changes:
+            changes = {"focal_length": 0.0, **changes}
         return replace(self, camera=_replace(self.camera, changes))
 
     def with_environment(self, **changes: Any) -> Scene:

@@ -8,6 +8,7 @@ from collections.abc import Collection
 
 import numpy as np
 
+from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
 from incpt.scene.light import KINDS
 from incpt.scene.model import Scene
@@ -49,11 +50,7 @@ def describe(scene: Scene) -> list[str]:
         bounds = np.stack([o.world_bounds for o in scene.objects])
         low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
         lines.append(f"bounds: {_described_point(low)} to {_described_point(high)} metres")
-    camera = scene.camera
-    lines.append(
-        f"camera: at {_described_point(camera.position)}, looks at {_described_point(camera.target)}, "
-        f"{camera.fov_y:g} degrees high"
-    )
+    lines.append(f"camera: {_described_camera(scene.camera, scene.settings.size)}")
     return lines + [f"warning: {problem}" for problem in scene_problems(scene)]
 
 
@@ -75,6 +72,19 @@ def _described_environment(environment: Environment) -> str:
     height, width = environment.image.pixels.shape[:2]
     name = os.path.basename(environment.image.source or "made in Python")
     return f"{colour} times {name}, {width} x {height} pixels"
+
+
+def _described_camera(camera: Camera, size: tuple[int, int]) -> str:
+    aspect = size[0] / size[1]
+    if camera.is_orthographic:
+        seen = f"orthographic, {camera.ortho_height:g} metres high"
+    elif camera.focal_length:
+        seen = f"{camera.focal_length:g} mm, {camera.fov_y_at(aspect):.3g} degrees high"
+    else:
+        seen = f"{camera.fov_y:g} degrees high"
+    place = f"at {_described_point(camera.position)}, looks at {_described_point(camera.target)}"
+    sharp = f", f/{camera.f_stop:g}, sharp at {camera.sharp_distance:.4g} metres" if camera.has_lens else ""
+    return f"{place}, {seen}{sharp}"
 
 
 def _described_point(point: Collection[float]) -> str:

@@ -113,7 +113,7 @@ def _changed_around_camera(scene: Scene, change: Change) -> list[Object]:
         for obj in scene.objects
         if (obj.material in change.materials or obj.name in change.reassigned)
         and obj.visible
-        and has_in_bounds(obj, scene.camera.position)
+        and has_in_bounds(obj, scene.camera.start)
     ]
 
 

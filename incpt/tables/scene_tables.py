@@ -98,6 +98,9 @@ class SceneTables:
             "BRUTE_FORCE": self.is_brute_force,
             "CUTOUTS": materials.has_cutouts,
             "VERTEX_COLORS": self.attributes.has_colors,
+            "LENS": self.scene.camera.is_orthographic
+            or self.scene.camera.has_lens
+            or self.scene.camera.near > 0,
         }
         textures = (f"TEXTURES {self.textures.slots}u",) if self.textures.slots else ()
         return (*self.features, *textures, *(name for name, holds in names.items() if holds))
@@ -148,7 +151,7 @@ class SceneTables:
         stack: list[int] = []
         materials = list(scene.materials.values())
         if self.has_media:
-            for obj in transparent_bodies_around(scene, scene.camera.position):
+            for obj in transparent_bodies_around(scene, scene.camera.start):
                 medium = numbers[obj.material]
                 priority = _rank(materials[medium])
                 below = [i for i, other in enumerate(stack) if _rank(materials[other]) <= priority]

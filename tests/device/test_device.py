@@ -282,6 +282,7 @@ VARIANTS = [
     (*LIGHTS, *RESTRICTIONS[:3], "MATTE"),
     (*LIGHTS, "MEDIA", *RESTRICTIONS),
     (*LIGHTS, *RESTRICTIONS[:3]),
+    (*LIGHTS, *RESTRICTIONS[:3], "LENS"),
     (*LIGHTS, *RESTRICTIONS[1:2]),
     ("TRIANGLE_LIGHTS", "MEDIA", *RESTRICTIONS, "PORTABLE_LANES"),
     ("TRIANGLE_LIGHTS", "PORTABLE_LANES"),
@@ -335,7 +336,8 @@ def test_kernels_build_without_warnings(device: Device) -> None:
         text = program.source(path)
         if "__kernel" not in text:
             continue
-        for features in variants if "LIGHT_SAMPLING" in text else [()]:
+        asked = [(), ("LENS",)] if file == "generate" else [()]
+        for features in variants if "LIGHT_SAMPLING" in text else asked:
             if file == "sample_lights" and not set(features) & {*LIGHTS, "SHAPED_LIGHTS"}:
                 continue  # launched only where there is something to sample
             built = cl.Program(device.context, device.program_text(file, features))

@@ -438,6 +438,26 @@ def test_files_are_tried_with_every_parameter_of_materials() -> None:
 
 
 @st.composite
+def lenses(draw: st.DrawFn, position: Any) -> Camera:
+    """A camera with any of its fields."""
+    target = tuple(p + 1e3 if p < 0 else p - 1e3 for p in position)
+    ranges = {
+        "fov_y": (1, 179), "ortho_height": (1e-3, 1e6), "focal_length": (0, 500), "sensor_width": (1, 100),
+        "sensor_height": (1, 100), "shift_x": (-2, 2), "shift_y": (-2, 2), "f_stop": (0, 64),
+        "focus_distance": (0, 1e6), "blade_rotation": (-360, 360), "near": (0, 1e3),
+    }  # fmt: skip
+    values: dict[str, Any] = {
+        name: draw(st.floats(*draw(st.sampled_from([(low, low), (low, high)]))))
+        for name, (low, high) in ranges.items()
+    }
+    values["projection"] = draw(st.sampled_from(["perspective", "orthographic"]))
+    values["sensor_fit"] = draw(st.sampled_from(["auto", "horizontal", "vertical"]))
+    values["blades"] = draw(st.sampled_from([0, 3, 7]))
+    assert set(values) | {"position", "target", "up"} == {field.name for field in fields(Camera)}
+    return Camera(position, target, **values)
+
+
+@st.composite
 def scenes(draw: st.DrawFn) -> Scene:
     materials = draw(st.dictionaries(names, materials_strategy, min_size=1, max_size=3))
     side = st.one_of(st.floats(1e-6, LARGEST), st.floats(-LARGEST, -1e-6))
@@ -469,9 +489,7 @@ def scenes(draw: st.DrawFn) -> Scene:
         strategy=draw(st.sampled_from(["restart", "spiral"])),
     )
     return Scene(
-        Camera(
-            position, tuple(p + 1e3 if p < 0 else p - 1e3 for p in position), fov_y=draw(st.floats(1, 179))
-        ),
+        draw(lenses(position)),
         Environment(draw(radiances), None, draw(numbers), draw(st.floats(0, LARGEST))),
         materials,
         tuple(objects),

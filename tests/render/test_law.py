@@ -67,6 +67,12 @@ def materials(name: str, **changes: object) -> Edit:
     return lambda scene: scene.with_material(name, **changes)
 
 
+LENSES: list[dict[str, object]] = [
+    {"f_stop": 0.1, "focus_distance": 3.0, "blades": 5},
+    {"f_stop": 0.0, "shift_x": 0.1, "shift_y": -0.2},
+    {"projection": "orthographic", "ortho_height": 3.0, "near": 0.5},
+    {"projection": "perspective", "focal_length": 35.0},
+]
 material_names = st.sampled_from(["red", "floor", "grey", "glass", "lamp"])
 edits = st.one_of(
     st.builds(lambda n, v: on_object(n, position=v), names, vectors),
@@ -84,6 +90,7 @@ edits = st.one_of(
     st.builds(lambda n, t: materials(n, transmission=t), material_names, unit),
     st.builds(lambda n, e: materials(n, emission=(e, e, 2 * e)), material_names, unit),
     st.builds(lambda x: lambda s: s.with_camera(position=(x, 1.4, 4.2)), numbers),
+    st.builds(lambda c: lambda s: s.with_camera(**c), st.sampled_from(LENSES)),
     st.builds(lambda i, r: lambda s: s.with_environment(intensity=i, rotation_y=90 * r), unit, numbers),
     st.builds(lambda on: lambda s: s.with_environment(image=sky() if on else None), st.booleans()),
 )

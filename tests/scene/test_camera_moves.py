@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from support.cameras import cameras, points, units
 
 from incpt.core import affine
 from incpt.core.affine import Vector
@@ -20,22 +21,8 @@ from incpt.scene.checks import LARGEST
 SIZE = (960, 540)
 HEIGHT = SIZE[1]
 
-units = st.floats(-1, 1)
-directions = st.tuples(units, units, units).filter(lambda v: math.hypot(*v) > 0.1)
-points = st.tuples(*[st.floats(-50, 50)] * 3)
 pixels = st.tuples(st.floats(0, SIZE[0]), st.floats(0, SIZE[1]))
 drags = st.tuples(st.floats(-2000, 2000), st.floats(-2000, 2000))
-
-
-@st.composite
-def cameras(draw: st.DrawFn, tilted: bool = True) -> Camera:
-    target = draw(points)
-    back = np.array(draw(directions))
-    back *= draw(st.floats(0.1, 100)) / np.linalg.norm(back)
-    up = draw(directions) if tilted else (0.0, 1.0, 0.0)
-    assume(np.linalg.norm(np.cross(back, up)) > 1e-2 * np.linalg.norm(back) * math.hypot(*up))
-    position = (np.array(target) + back).tolist()
-    return Camera(tuple(position), target, up, draw(st.floats(5, 120)))
 
 
 def pixel_of(camera: Camera, point: Vector) -> np.ndarray:
@@ -66,7 +53,7 @@ def test_pan_keeps_the_point_under_the_cursor(
 ) -> None:
     point = camera_moves.point_under(camera, start, SIZE)
     assert pixel_of(camera, point) == pytest.approx(start, abs=1e-3)
-    panned = camera_moves.pan(camera, *drag, HEIGHT)
+    panned = camera_moves.pan(camera, *drag, SIZE)
     assert pixel_of(panned, point) == pytest.approx(np.add(start, drag), abs=0.01)
     assert distance(panned) == pytest.approx(distance(camera))
 
@@ -79,7 +66,12 @@ def test_zoom_keeps_the_point_under_the_cursor(
     point = camera_moves.point_under(camera, cursor, SIZE)
     zoomed = camera_moves.wheel(camera, notches, cursor, SIZE)
     assert pixel_of(zoomed, point) == pytest.approx(cursor, abs=0.01)
-    assert distance(zoomed) == pytest.approx(distance(camera) * camera_moves.WHEEL_FACTOR**notches)
+    factor = camera_moves.WHEEL_FACTOR**notches
+    if camera.is_orthographic:
+        assert zoomed.ortho_height == pytest.approx(camera.ortho_height * factor)
+        assert distance(zoomed) == pytest.approx(distance(camera))
+    else:
+        assert distance(zoomed) == pytest.approx(distance(camera) * factor)
     assert camera_moves.point_under(zoomed, cursor, SIZE) == pytest.approx(point, abs=1e-6)
 
 
@@ -94,7 +86,7 @@ def test_orbit_keeps_target_distance_and_stays_off_the_poles(
     wanted = elevation(camera) + drag[1] * camera_moves.ORBIT_DEG / HEIGHT
     clamped = min(max(wanted, -MAX_ELEVATION_DEG), MAX_ELEVATION_DEG)
     assert elevation(turned) == pytest.approx(clamped, abs=1e-3)
-    assert pixel_of(turned, camera.target) == pytest.approx(np.array(SIZE) / 2, abs=1e-3)
+    assert pixel_of(turned, camera.target) == pytest.approx(pixel_of(camera, camera.target), abs=1e-3)
 
 
 @quick
@@ -183,10 +175,16 @@ def test_frame_shows_all_of_a_box_with_margin(
     normalized = np.abs(found * 2 - 1).max()
     assert normalized <= 1 / camera_moves.FRAME_MARGIN + 1e-3
     if max(extent) > 0.01:
+        clearance = camera_moves.FRAME_CLEARANCE * math.hypot(*extent)
+        if framed.is_orthographic and framed.ortho_height > 1.001 * clearance:
+            assert normalized == pytest.approx(1 / camera_moves.FRAME_MARGIN, abs=1e-3)
         nearest = ((affine.box_corners(box) - framed.position) @ forward).min()
-        is_close = nearest == pytest.approx(camera_moves.FRAME_CLEARANCE * math.hypot(*extent), rel=1e-3)
+        is_close = nearest == pytest.approx(clearance, rel=1e-3) or framed.is_orthographic
         assert is_close or normalized == pytest.approx(1 / camera_moves.FRAME_MARGIN, abs=1e-3)
-        assert framed.target == pytest.approx(box.mean(axis=0))
+        middle, _ = framed.project(box.mean(axis=0)[None], aspect)
+        assert middle[0] == pytest.approx([0.5, 0.5], abs=1e-6)
+        depth = (np.mean(box, axis=0) - framed.position) @ forward
+        assert distance(framed) == pytest.approx(depth)
 
 
 @pytest.mark.parametrize("side", list(VIEWS))
@@ -228,7 +226,7 @@ def test_no_move_leaves_what_a_scene_allows(x: float, z: float, drag: float, oth
     moved = [
         camera_moves.orbit(camera, drag, other, HEIGHT),
         camera_moves.look(camera, drag, other, HEIGHT),
-        camera_moves.pan(camera, drag, other, HEIGHT),
+        camera_moves.pan(camera, drag, other, SIZE),
         camera_moves.wheel(camera, drag, (3, 4), SIZE),
         camera_moves.dolly(camera, drag, other, HEIGHT),
         camera_moves.fly(camera, 1, 1, 1, 1.0, drag),

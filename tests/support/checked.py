@@ -109,12 +109,18 @@ def lamps() -> Scene:
     return replace(mixed_scene(), lights=(*lights, Light("star", "point", (0, 1, 2), radius=0)))
 
 
+def behind_a_lens() -> Scene:
+    """What the variant for lenses is for."""
+    return mixed_scene().with_camera(f_stop=0.1, blades=5, near=0.1)
+
+
 SCENES: dict[str, Any] = {
     "empty": empty_glass,
     "flat": flat_box,
     "mixed": mixed_scene,
     "frosted": frosted,
     "lamps": lamps,
+    "lens": behind_a_lens,
 }
 
 

@@ -214,6 +214,23 @@ def lights() -> Scene:
     return Scene(camera, Environment(), materials, objects, lights=lamps)
 
 
+def lens() -> Scene:
+    """The box behind a lens that is wide open, of which a plane between the blocks is sharp."""
+    return cornell().with_camera(f_stop=0.12, focus_distance=3.6, focal_length=30.0, sensor_fit="vertical")
+
+
+def orthographic() -> Scene:
+    """The box in parallel projection, from above and aside."""
+    return cornell().with_camera(position=(0.5, 1.9, 3.6), projection="orthographic", ortho_height=2.6)
+
+
+def shifted() -> Scene:
+    """The box seen by a camera that stands higher and further left, and looks straight ahead."""
+    return cornell().with_camera(
+        position=(-0.3, 1.3, 3.6), target=(-0.3, 1.3, 0), shift_x=0.08, shift_y=-0.12
+    )
+
+
 REFERENCES = {
     "cornell": Reference(cornell, 3),
     "glass": Reference(glass, 20),
@@ -223,4 +240,7 @@ REFERENCES = {
     "textured": Reference(textured, 3),
     "embossed": Reference(embossed, 3),
     "lights": Reference(lights, 3),
+    "lens": Reference(lens, 3),
+    "orthographic": Reference(orthographic, 3),
+    "shifted": Reference(shifted, 3),
 }

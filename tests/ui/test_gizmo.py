@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support.cameras import cameras
 
 from incpt.scene import edits
+from incpt.scene.camera import Camera
 from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
+from incpt.ui.display.projection import clip_from_world
+from incpt.ui.rect import Rect
 from incpt.ui.viewport import gizmo
 
 SHEARED = np.array([[1.0, 0.5, 0.0, 3.0], [0.0, 2.0, 0.25, -1.0], [0.1, 0.0, 1.5, 2.0]])
@@ -40,3 +46,22 @@ def test_handles_of_a_sheared_object_are_at_right_angles_and_keep_its_shear() ->
     np.testing.assert_allclose(
         scaled.world_from_object, delta[:3, :3] @ SHEARED + [[0, 0, 0, x] for x in delta[:3, 3]]
     )
+
+
+@given(cameras(), st.floats(0.3, 4), st.floats(0.1, 50), st.tuples(st.floats(0, 1), st.floats(0, 1)))
+def test_handles_and_outlines_are_where_the_camera_sees_them(
+    camera: Camera, aspect: float, distance: float, place: tuple[float, float]
+) -> None:
+    starts, directions = camera.rays(np.array([place]), aspect)
+    point = np.append(starts + distance * directions, 1.0)
+    rect = Rect(0, 0, 256, 256)
+    for matrix in (
+        gizmo.projection_matrix(camera, aspect) @ gizmo.view_matrix(camera),
+        clip_from_world(camera, aspect, Rect(0.0, 0.0, 256.0, 256.0), rect),
+    ):
+        clip = matrix @ point
+        assert clip[3] > 0 and abs(clip[2]) <= clip[3]
+        assert (clip[0] / clip[3] + 1) / 2 == pytest.approx(place[0], abs=1e-6)
+        assert (1 - clip[1] / clip[3]) / 2 == pytest.approx(place[1], abs=1e-6)
+        behind = matrix @ np.append(starts - distance * directions, 1.0)
+        assert behind[3] <= 0 or behind[2] < -behind[3]

@@ -15,6 +15,9 @@ from incpt.ui.rect import Rect
 
 _NEAR = 1e-4
 """The distance from the camera below which nothing is outlined, in metres."""
+_FAR = 1e5
+"""That of an orthographic camera beyond which nothing is outlined, in metres: single precision tells a
+centimetre from nothing there."""
 
 
 def whole_pixels(rect_px: Rect[float], *bounds_px: Rect[float]) -> Rect[int] | None:
@@ -48,6 +51,12 @@ def clip_from_world(
     rows = np.stack([right / (right @ right), up / (up @ up), forward])
     view = np.column_stack([rows, -rows @ np.asarray(camera.position, np.float64)])
     across, down, depth = view
+    one = np.array([0.0, 0.0, 0.0, 1.0])
+    nearest = max(_NEAR, camera.near)
+    # What x and y are divided by.
+    divisor = one if camera.is_orthographic else depth
+    shift_x, shift_y = camera.shift_at(aspect)
+    across, down = across - shift_x * divisor, down - shift_y * divisor
     x, y, width, height = rect_px
     part_x, part_y, part_width, part_height = part
     # The image spans -1 to 1 of its own along each axis. This scales it and moves it to where the viewport
@@ -55,8 +64,10 @@ def clip_from_world(
     scale_x, scale_y = width / part_width, height / part_height
     move_x = (2 * (x - part_x) + width) / part_width - 1
     move_y = 1 - (2 * (y - part_y) + height) / part_height
-    near = depth - np.array([0, 0, 0, 2 * _NEAR])
-    return np.stack([scale_x * across + move_x * depth, scale_y * down + move_y * depth, near, depth])
+    # Depth is clipped at -1 and 1 times the divisor.
+    span = 2 / (_FAR - nearest)
+    near = span * (depth - nearest * one) - one if camera.is_orthographic else depth - 2 * nearest * one
+    return np.stack([scale_x * across + move_x * divisor, scale_y * down + move_y * divisor, near, divisor])
 
 
 def covered(

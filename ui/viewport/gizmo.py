@@ -7,7 +7,6 @@ places relative to one another.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,6 +68,7 @@ class Gizmo:
         _gizmo.set_drawlist(imgui.get_background_draw_list())
         _gizmo.set_rect(*picture)
         _gizmo.set_gizmo_size_clip_space(0.14)
+        _gizmo.set_orthographic(scene.camera.is_orthographic)
         view = view_matrix(scene.camera)
         projection = projection_matrix(scene.camera, picture.width / picture.height)
         flat = _flat(matrix)
@@ -130,9 +130,16 @@ def view_matrix(camera: Camera) -> Matrix:
 
 def projection_matrix(camera: Camera, aspect: float) -> Matrix:
     """(4, 4) clip space from camera space, as OpenGL has it."""
-    scale = 1.0 / math.tan(math.radians(camera.fov_y) / 2.0)
+    right, up, _ = camera.image_plane(aspect)
+    shift_x, shift_y = camera.shift_at(aspect)
     matrix = np.zeros((4, 4))
-    matrix[0, 0], matrix[1, 1] = scale / aspect, scale
+    matrix[0, 0], matrix[1, 1] = 1.0 / np.linalg.norm(right), 1.0 / np.linalg.norm(up)
+    if camera.is_orthographic:
+        matrix[:2, 3] = -shift_x, -shift_y
+        matrix[2, 2], matrix[2, 3] = 2.0 / (_NEAR - _FAR), (_FAR + _NEAR) / (_NEAR - _FAR)
+        matrix[3, 3] = 1.0
+        return matrix
+    matrix[:2, 2] = shift_x, shift_y
     matrix[2, 2], matrix[2, 3] = (_FAR + _NEAR) / (_NEAR - _FAR), 2.0 * _FAR * _NEAR / (_NEAR - _FAR)
     matrix[3, 2] = -1.0
     return matrix

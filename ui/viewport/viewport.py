@@ -197,7 +197,7 @@ class Viewport:
         if bindings.is_drag(mouse[0] - press.at[0], mouse[1] - press.at[1]):
             press.is_drag = True
         if press.is_drag and press.action is not None:
-            moved = _moved(outcome.scene.camera, press.action, press.last, mouse, picture.height)
+            moved = _moved(outcome.scene.camera, press.action, press.last, mouse, picture.size)
             if press.action is MouseAction.FLY:
                 moved = _flown(moved, fly_speed)
             outcome = self._with_camera(outcome, moved, press.action)
@@ -211,7 +211,7 @@ class Viewport:
 
     def _fly_freely(self, outcome: Outcome, speed: float, picture: Rect[float]) -> Outcome:
         mouse = _mouse()
-        moved = _moved(outcome.scene.camera, MouseAction.FLY, self._last_mouse, mouse, picture.height)
+        moved = _moved(outcome.scene.camera, MouseAction.FLY, self._last_mouse, mouse, picture.size)
         self._last_mouse = mouse
         is_clicked = any(map(imgui.is_mouse_clicked, range(3)))
         if is_clicked or imgui.is_key_pressed(imgui.Key.escape, False):
@@ -273,17 +273,20 @@ def _clicked(outcome: Outcome, at: Point, is_additive: bool, picture: Rect[float
     return outcome if is_additive else replace(outcome, selection=Selection())
 
 
-def _moved(camera: Camera, action: MouseAction, last: Point, mouse: Point, height: float) -> Camera:
+def _moved(
+    camera: Camera, action: MouseAction, last: Point, mouse: Point, size: tuple[float, float]
+) -> Camera:
     dx, dy = mouse[0] - last[0], mouse[1] - last[1]
     if not (dx or dy):
         return camera
+    if action is MouseAction.PAN:
+        return camera_moves.pan(camera, dx, dy, size)
     moves = {
         MouseAction.ORBIT: camera_moves.orbit,
-        MouseAction.PAN: camera_moves.pan,
         MouseAction.DOLLY: camera_moves.dolly,
         MouseAction.FLY: camera_moves.look,
     }
-    return moves[action](camera, dx, dy, height)
+    return moves[action](camera, dx, dy, size[1])
 
 
 def _flown(camera: Camera, speed: float) -> Camera:

@@ -13,8 +13,8 @@ from incpt.render.film import Film, Float32Array
 from incpt.render.first_hits import Window, first_hits
 from incpt.render.impact.anchor import Anchor
 from incpt.render.impact.estimator import Estimator, SeenPair
-from incpt.render.impact.exploration import windows
-from incpt.render.impact.first_sight import CenterHits, FirstSight, rows_columns
+from incpt.render.impact.exploration import most_blur, windows
+from incpt.render.impact.first_sight import CenterHits, FirstSight, rows_columns, widened
 from incpt.render.impact.tile_sums import TileSums
 from incpt.render.tiles import TileGrid
 from incpt.render.tracer import Tracer
@@ -116,6 +116,9 @@ def compared(
     seen = windows(grid, scene.camera, anchor.affected(scene))
     hits = _followed(anchor_hits, tracer, new, settings, seen)
     pair = _seen_pair(anchor, anchor_hits, hits, seen)
+    if scene.camera.has_lens:
+        reach = most_blur(grid, scene.camera, anchor.affected(scene))
+        pair = replace(pair, changed=widened(pair.changed, reach))
     changes = change_tables(device, anchor.scene, scene)
     sight_before = before.first_sight if before is not None and before.grid == grid else None
     sight = FirstSight(anchor_hits, hits, seen, sight_before)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -33,20 +35,34 @@ def squares(grid: TileGrid, chosen: npt.NDArray[np.bool_]) -> IntArray:
 
 
 def windows(grid: TileGrid, camera: Camera, objects: tuple[Placed, ...]) -> list[Window]:
-    """The rectangles around what is seen of the bounds of each object."""
+    """The rectangles around what is seen of the bounds of each object, from anywhere on the lens."""
     found = []
+    aspect, size = grid.width / grid.height, np.array([grid.width, grid.height])
     for obj in objects:
         corners = _cut_off(camera, affine.box_corners(obj.world_bounds))
-        places, in_front = camera.project(corners, grid.width / grid.height)
+        places, in_front = camera.project(corners, aspect)
         if not in_front.any():
             continue
-        pixels = places[in_front] * (grid.width, grid.height)
+        # From each point of the lens a box is seen within its corners as they are seen from there.
+        blur = camera.blur(corners[in_front], aspect) * size if camera.has_lens else 0.0
+        pixels = places[in_front] * size
         # Corners may be anywhere, also beyond what whole numbers hold.
-        low = np.clip(np.floor(pixels.min(axis=0)), 0, [grid.width, grid.height]).astype(int)
-        high = np.clip(np.ceil(pixels.max(axis=0)), 0, [grid.width, grid.height]).astype(int)
+        low = np.clip(np.floor((pixels - blur).min(axis=0)), 0, size).astype(int)
+        high = np.clip(np.ceil((pixels + blur).max(axis=0)), 0, size).astype(int)
         if (low < high).all():
             found.append((int(low[0]), int(low[1]), int(high[0]), int(high[1])))
     return found
+
+
+def most_blur(grid: TileGrid, camera: Camera, objects: tuple[Object, ...]) -> int:
+    """How many pixels beside its place something of these objects may be seen through a lens, at most an
+    eighth of the picture's height."""
+    size = np.array([grid.width, grid.height])
+    most = 0.0
+    for obj in objects:
+        blur = camera.blur(_cut_off(camera, affine.box_corners(obj.world_bounds)), grid.width / grid.height)
+        most = max(most, float((blur * size).max()))
+    return math.ceil(min(most, grid.height / 8))
 
 
 def _cut_off(camera: Camera, corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -54,7 +70,7 @@ def _cut_off(camera: Camera, corners: npt.NDArray[np.float64]) -> npt.NDArray[np
     lies on both sides of that: what is seen of it may reach as far as these points."""
     forward = camera.image_plane(1.0)[2]
     depth = (corners - np.asarray(camera.position)) @ forward
-    plane = _CLOSE * float(np.abs(depth).max())
+    plane = max(_CLOSE * float(np.abs(depth).max()), camera.near)
     first, last = _EDGES
     cut = (depth[first] > plane) != (depth[last] > plane)
     first, last = first[cut], last[cut]

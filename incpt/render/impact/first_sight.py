@@ -133,7 +133,7 @@ class FirstSight:
         objects = self._now.objects[inside]
         shows_moved = is_moved[objects]
         # Pixels around it, which show a bit of it, go with those that showed it.
-        uncovered = _widened(was_moved[self._anchor.objects[inside]], 1) & ~shows_moved
+        uncovered = widened(was_moved[self._anchor.objects[inside]], 1) & ~shows_moved
         light = np.zeros((*objects.shape, 3), np.float32)
         for number in np.unique(objects[shows_moved]):
             chosen = shows_moved & (objects == number)
@@ -185,7 +185,7 @@ class FirstSight:
         )
         objects = self._anchor.objects[wide]
         place = self._anchor.scene.object_index[self._now.scene.objects[number].name] if number >= 0 else -1
-        is_free = ~_widened(self._moved[0][objects], _RIM)
+        is_free = ~widened(self._moved[0][objects], _RIM)
         is_known = is_free & (objects == place)
         is_known = is_known if is_known.any() else is_free
         filled = _smoothed_down(
@@ -238,12 +238,12 @@ def _reflectance(objects: npt.NDArray[np.int32], colors: Float32Array) -> Float3
     return np.where(objects[..., None] < 0, np.float32(1), np.maximum(colors, np.float32(_LEAST_REFLECTANCE)))
 
 
-def _widened(mask: Mask, pixels: int) -> Mask:
+def widened(mask: Mask, pixels: int) -> Mask:
     """What is within so many pixels of the mask, across and down."""
     for axis in (0, 1):
-        ends = np.pad(mask, [(pixels, pixels) if one == axis else (0, 0) for one in (0, 1)])
-        shifted = [np.take(ends, np.arange(mask.shape[axis]) + i, axis) for i in range(2 * pixels + 1)]
-        mask = np.logical_or.reduce(shifted)
+        ends = np.pad(mask, [(pixels + 1, pixels) if one == axis else (0, 0) for one in (0, 1)])
+        counts, places = np.cumsum(ends, axis=axis, dtype=np.int32), np.arange(mask.shape[axis])
+        mask = np.take(counts, places + 2 * pixels + 1, axis) > np.take(counts, places, axis)
     return mask
 
 

@@ -164,6 +164,10 @@ EDITS = [
     Edit("glass glows", nested, lambda s: s.with_material("partly", emission=(0, 1, 2))),
     Edit("other lamps", mixed, lambda s: s.with_material("second", emission=(1, 2, 8)).with_object(
         "lamp", material="second").with_object("red cube", position=(0, 0.6, 0))),
+    Edit("behind a lens", lambda: mixed().with_camera(f_stop=0.1, focus_distance=3.0),
+         lambda s: s.with_object("red cube", position=(0.15, 0.5, -0.1)), 0.4),
+    Edit("in parallel", lambda: mixed().with_camera(projection="orthographic", ortho_height=3.0, shift_x=0.1),
+         lambda s: s.with_object("glass ball", position=(0.9, 0.6, 0.2)), 0.45),
     Edit("partly", nested, lambda s: s.with_material("partly", transmission=0.8), 0.5),
 ]  # fmt: skip
 

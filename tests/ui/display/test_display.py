@@ -325,8 +325,24 @@ def mask_at(window: Screen, rect: Rect[float], selection: Outlined) -> npt.NDArr
         lone("floor"),
         lone("red cube", scale=(30, 30, 30)),
         lone("floor", scale=(400, 1, 400)),
+        lone("red cube").with_camera(projection="orthographic", ortho_height=3, shift_x=0.2),
+        lone("floor", scale=(400, 1, 400)).with_camera(projection="orthographic", ortho_height=3),
+        lone("red cube").with_camera(shift_x=0.2, shift_y=-0.1, focal_length=30),
+        lone("floor").with_camera(near=4.0),
     ],
-    ids=["cube", "mirrored", "ball", "tilted", "floor", "from inside", "behind the camera too"],
+    ids=[
+        "cube",
+        "mirrored",
+        "ball",
+        "tilted",
+        "floor",
+        "from inside",
+        "behind the camera too",
+        "orthographic",
+        "behind an orthographic camera too",
+        "shifted",
+        "near",
+    ],
 )
 def test_the_mask_is_what_the_path_tracer_sees(screen: Any, device: Device, scene: Scene) -> None:
     seen = Session(scene, device=device).first_hits().object_id >= 0
