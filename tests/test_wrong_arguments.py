@@ -93,7 +93,7 @@ RIGHT: Mapping[str, Mapping[str, Any]] = {
 WORDS = {
     "choice": ("device", "--device"), "device": ("device", "--device"), "layers": ("layers", "layer "),
     "linear": ("image",), "pixels": ("pixels", "image"),
-    "name": ("name", "object ", "light ", "material ", "shape ", "pass "),
+    "name": ("name", "camera ", "object ", "light ", "material ", "shape ", "pass "),
 }  # fmt: skip
 """How messages begin, where not with the argument's name."""
 MADE_BY_INCPT = {"Change", "FirstHits", "Mode", "Snapshot", "StepReport"}

@@ -126,13 +126,18 @@ class Workspace:
         scene = editor.scene
         with widgets.section("Camera") as is_open:
             if is_open:
-                new, wanted = camera_panel.draw(scene.camera, refusals)
+                chosen = camera_panel.draw_choice(tuple(scene.cameras), scene.camera_name)
+                width, height = scene.settings.size
+                new, wanted = camera_panel.draw(scene.camera, width / height, refusals)
                 if new is not scene.camera:
                     editor.propose(replace(scene, camera=new), "Camera", _key())
+                if wanted.is_focus:
+                    camera.focus_selected(editor)
                 if wanted.is_frame:
                     camera.frame_selected(editor)
                 if wanted.is_reset:
                     camera.reset_camera(editor)
+                editor.attempt(lambda: _apply_camera_outcome(editor, chosen))
         scene = editor.scene
         with widgets.section("Environment") as is_open:
             if is_open:
@@ -220,6 +225,17 @@ def _tell(editor: Editor, refusals: Refusals) -> None:
     # A refusal is no line in the panel: it lasts for one frame only, and the panel may be scrolled.
     for message in refusals.messages:
         editor.say(message, "warning")
+
+
+def _apply_camera_outcome(editor: Editor, outcome: camera_panel.Outcome) -> None:
+    if outcome.activate is not None:
+        camera.activate(editor, outcome.activate)
+    if outcome.is_new:
+        camera.new_camera(editor)
+    if outcome.is_rename:
+        camera.rename_camera(editor)
+    if outcome.is_delete:
+        camera.delete_camera(editor)
 
 
 def _apply_material_outcome(editor: Editor, material: str, outcome: material_panel.Outcome) -> None:

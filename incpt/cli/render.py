@@ -36,6 +36,9 @@ def render(
     seed: SeedOption = None,
     strategy: Annotated[str | None, typer.Option(help=f"{' or '.join(STRATEGIES)}.")] = None,
     max_bounces: BouncesOption = None,
+    camera: Annotated[
+        str | None, typer.Option(help="A camera of the scene by its name, in place of the active one.")
+    ] = None,
     aovs: Annotated[
         bool,
         typer.Option(
@@ -55,6 +58,8 @@ def render(
     if aovs and output.suffix.lower() != ".exr":
         raise InputError(f"--aovs: {output} cannot hold them; use an .exr")
     scene = registry.load(scene_file)
+    if camera is not None:
+        scene = scene.with_active_camera(camera)
     settings = settings_from(scene, size=size, seed=seed, strategy=strategy, max_bounces=max_bounces)
     if aovs:
         settings = replace(settings, aovs=True)

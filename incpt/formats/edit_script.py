@@ -7,11 +7,14 @@ cumulative = true           # each edit on top of the one before; false: each on
 [[edits]]
 name = "rotate red cube"    # optional label
 step = 0                    # rendering step, after the base picture, at which the edit happens
-object = "red cube"         # or material = "red", light = "lamp", camera = true, environment = true
+object = "red cube"         # or material = "red", light = "lamp", camera = true (the active one), camera = "top",
+                            # environment = true
 rotation = [0, 30, 35]      # the new values, with the keys of the scene file
 pixel = [480, 270]          # optional: the point of change, for point_of_change = "pixel"
 capture = [0, 30]           # optional: instead of the file's
 ```
+
+A camera has the key `active` as well: the scene is seen through it from then on.
 """
 
 from __future__ import annotations
@@ -48,7 +51,7 @@ _VALUE_KEYS: dict[str, tuple[str, ...]] = {
     "object": (*PLACEMENT_KEYS, "material", *MESH_KEYS),
     "material": MATERIAL_KEYS,
     "light": LIGHT_KEYS,
-    "camera": CAMERA_KEYS,
+    "camera": (*CAMERA_KEYS, "active"),
     "environment": ENVIRONMENT_KEYS,
 }
 
@@ -57,8 +60,9 @@ _VALUE_KEYS: dict[str, tuple[str, ...]] = {
 class Edit:
     """One edit: at rendering step `step` (0: right after the base picture) the `changes` are made.
 
-    `kind` is one of KINDS, `name` the object or material (None for camera and environment). `changes` are
-    the keyword arguments of `Scene.with_object` and its kin. Pictures are taken `capture` steps after the
+    `kind` is one of KINDS, `name` the object, material or camera (None for the active camera and for the
+    environment). `changes` are the keyword arguments of `Scene.with_object` and its kin, and `active` of a
+    camera. Pictures are taken `capture` steps after the
     edit. `pixel` is the point of change, where the script gives one.
     """
 
@@ -73,7 +77,7 @@ class Edit:
     def apply(self, scene: Scene) -> Scene:
         """The scene with this edit. Raises InputError."""
         if self.kind == "camera":
-            return scene.with_camera(**self.changes)
+            return self._with_camera(scene)
         if self.kind == "environment":
             return scene.with_environment(**self.changes)
         assert self.name is not None
@@ -83,6 +87,12 @@ class Edit:
         if self.kind == "light":
             return scene.with_light(self.name, **self.changes)
         return scene.with_object(self.name, **self.changes)
+
+    def _with_camera(self, scene: Scene) -> Scene:
+        name = scene.camera_name if self.name is None else self.name
+        seen_through = scene.with_active_camera(name)
+        scene = seen_through if self.changes.get("active") else scene
+        return scene.with_camera(name, **{k: v for k, v in self.changes.items() if k != "active"})
 
 
 @dataclass(frozen=True)
@@ -176,7 +186,7 @@ def _target(table: dict[str, Any]) -> tuple[str, str | None, dict[str, Any]]:
         raise InputError(f"{found}; give one of {', '.join(KINDS)}")
     kind = kinds[0]
     values = {key: value for key, value in table.items() if key not in _EDIT_KEYS and key != kind}
-    if kind in ("object", "material", "light"):
+    if kind in ("object", "material", "light") or (kind == "camera" and isinstance(table[kind], str)):
         return kind, text_of(table, kind, f"name the {kind}"), values
     if table[kind] is not True:
         raise InputError(f"{kind}: {table[kind]!r} is not true; write {kind} = true and its new values below")
@@ -195,6 +205,10 @@ def _changes(values: dict[str, Any], library: MeshLibrary) -> dict[str, Any]:
         with in_place("image"):
             name = text_of(changes, "image", "name an OpenEXR file")
             changes["image"] = images.load_image(library.folder / name)
+    if "active" in changes and changes["active"] is not True:
+        raise InputError(
+            f"active: {changes['active']!r} is not true; leave it out, or make another one active"
+        )
     if "material" in changes:
         text_of(changes, "material", "name a material of the scene")
     return textures.with_textures(changes, library.folder)

@@ -22,7 +22,7 @@ from incpt.scene.environment import Environment
 from incpt.scene.image import Image
 from incpt.scene.light import STRENGTHS, Light
 from incpt.scene.mesh import Mesh
-from incpt.scene.model import Object, Scene
+from incpt.scene.model import CAMERA_NAME, Object, Scene
 from incpt.scene.shapes import shape
 from incpt.scene.texture import Bitmap, Texture
 from incpt.scene.transform import Transform
@@ -158,7 +158,7 @@ def _document(scene: Scene, beside: _Beside) -> str:
 
     document = tomlkit.document()
     document["version"] = VERSION
-    document["camera"] = _camera_table(scene.camera)
+    document.update(_camera_tables(scene))
     document["environment"] = _environment_table(scene.environment, beside)
     render = _changed(scene.settings, beside)
     if render:
@@ -178,6 +178,14 @@ def _document(scene: Scene, beside: _Beside) -> str:
         raise InputError(
             one_line(f"scene: cannot be written as TOML ({error}); rename what is odd")
         ) from None
+
+
+def _camera_tables(scene: Scene) -> dict[str, Any]:
+    """The keys of the file that hold the cameras."""
+    if list(scene.cameras) == [CAMERA_NAME]:
+        return {"camera": _camera_table(scene.camera)}
+    cameras = {name: _camera_table(camera) for name, camera in scene.cameras.items()}
+    return {"active_camera": scene.camera_name, "cameras": cameras}
 
 
 def _camera_table(camera: Camera) -> dict[str, Any]:

@@ -22,13 +22,13 @@ from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
 from incpt.scene.light import KINDS, Light
 from incpt.scene.material import Material
-from incpt.scene.model import Object, Scene
+from incpt.scene.model import CAMERA_NAME, Object, Scene
 
 _T = TypeVar("_T")
 VERSION = 2
 """That is written."""
 _READ = (1, 2)
-_TABLES = ("version", "camera", "environment", "render", "materials", "objects", "lights")
+_TABLES = ("version", "camera", "cameras", "active_camera", "environment", "render", "materials", "objects", "lights")
 CAMERA_KEYS = tuple(field.name for field in fields(Camera))
 ENVIRONMENT_KEYS = tuple(field.name for field in fields(Environment))
 MATERIAL_KEYS = tuple(field.name for field in fields(Material))
@@ -46,8 +46,8 @@ def load_scene_toml(path: Path) -> Scene:
     tables = read_toml(path)
     _check_version(tables)
     check_keys(tables, _TABLES, "table or key")
-    with in_place("[camera]"):
-        camera = _built(Camera, table_of(tables, "camera"), CAMERA_KEYS)
+    cameras = _cameras(tables)
+    active = _active_camera(tables, cameras)
     with in_place("[environment]"):
         environment = _environment(table_of(tables, "environment"), path.parent)
     with in_place("[render]"):
@@ -55,7 +55,10 @@ def load_scene_toml(path: Path) -> Scene:
     materials = _materials(table_of(tables, "materials"), path.parent)
     objects = _objects(tables.get("objects", []), materials, path.parent)
     lights = _lights(tables.get("lights", []))
-    return Scene(camera, environment, materials, tuple(objects), settings, tuple(lights))
+    return Scene(
+        cameras[active], environment, materials, tuple(objects), settings, tuple(lights), camera_name=active,
+        cameras=cameras,
+    )  # fmt: skip
 
 
 def _check_version(tables: Mapping[str, Any]) -> None:
@@ -70,6 +73,32 @@ def _check_version(tables: Mapping[str, Any]) -> None:
 def _built(kind: type[_T], table: Mapping[str, Any], known: Collection[str]) -> _T:
     check_keys(table, known)
     return kind(**table)
+
+
+def _cameras(tables: Mapping[str, Any]) -> dict[str, Camera]:
+    """By name, in the order of the file; that of the table [camera] is the first."""
+    cameras: dict[str, Camera] = {}
+    if "camera" in tables or not table_of(tables, "cameras"):
+        with in_place("[camera]"):
+            cameras[CAMERA_NAME] = _built(Camera, table_of(tables, "camera"), CAMERA_KEYS)
+    for name, table in table_of(tables, "cameras").items():
+        with in_place(f"[cameras.{name if name.isidentifier() else quoted(name)}]"):
+            if not isinstance(table, dict):
+                raise InputError("is not a table; write its values below")
+            if name in cameras:
+                raise InputError("is the name of the table [camera] too; rename one of them")
+            cameras[name] = _built(Camera, table, CAMERA_KEYS)
+    return cameras
+
+
+def _active_camera(tables: Mapping[str, Any], cameras: Mapping[str, Camera]) -> str:
+    """The name of the camera that the scene is seen through: the first one, unless the file says another."""
+    if "active_camera" not in tables:
+        return next(iter(cameras))
+    name = text_of(dict(tables), "active_camera", "name one of [cameras]")
+    if name not in cameras:
+        raise InputError(f"active_camera: {name!r} is not in [cameras]; it has {', '.join(cameras)}")
+    return name
 
 
 def _environment(table: dict[str, Any], folder: Path) -> Environment:

@@ -18,11 +18,12 @@ import numpy.typing as npt
 from incpt.core import affine
 from incpt.core.affine import Vector
 from incpt.core.errors import InputError
+from incpt.scene.camera import Camera
 from incpt.scene.checks import LARGEST
 from incpt.scene.light import Light
 from incpt.scene.material import Material
 from incpt.scene.mesh_part import MeshPart
-from incpt.scene.model import Object, Placed, Scene
+from incpt.scene.model import CAMERA_NAME, Object, Placed, Scene
 from incpt.scene.shapes import shape
 from incpt.scene.transform import SMALLEST_SCALE, Transform
 
@@ -245,6 +246,22 @@ def rename_material(scene: Scene, old: str, new: str) -> Scene:
         materials={new if n == old else n: m for n, m in scene.materials.items()},
         objects=tuple(replace(o, material=new) if o.material == old else o for o in scene.objects),
     )
+
+
+def add_camera(scene: Scene, camera: Camera, name: str = CAMERA_NAME) -> tuple[Scene, str]:
+    """The scene with one more camera, through which it is seen now; the camera's name, which begins with
+    `name`."""
+    name = unique_name(name, scene.cameras)
+    return replace(scene, camera=camera, camera_name=name), name
+
+
+def rename_camera(scene: Scene, old: str, new: str) -> Scene:
+    """The scene with a camera called otherwise, in its place. Raises InputError: a name that is empty or
+    taken."""
+    scene.with_active_camera(old)
+    new = _checked_name(new, old, scene.cameras, "camera")
+    cameras = {new if name == old else name: camera for name, camera in scene.cameras.items()}
+    return replace(scene, cameras=cameras, camera_name=new if scene.camera_name == old else scene.camera_name)
 
 
 def unique_name(name: str, taken: Collection[str]) -> str:

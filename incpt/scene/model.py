@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from operator import attrgetter
-from types import MappingProxyType
+from types import MappingProxyType, NoneType
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,10 @@ from incpt.scene.transform import IDENTITY, Transform
 _PLACEMENT = ("position", "rotation", "scale", "matrix")
 """Keywords of an object that stand for parts of its transform."""
 _NAME, _MATERIAL = attrgetter("name"), attrgetter("material")
+
+
+CAMERA_NAME = "camera"
+"""That of a camera that was given none."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +113,11 @@ Placed = Object | Light
 @dataclass(frozen=True)
 class Scene:
     """Everything that is seen: materials by name, and objects and lights whose names differ. `settings` is
-    the scene's own proposal of how to render it. Raises InputError."""
+    the scene's own proposal of how to render it.
+
+    `camera` is the active one, through which the scene is seen. All cameras stand in `cameras` by name, the
+    active one under `camera_name`, whatever else was given for it there. Raises InputError.
+    """
 
     camera: Camera = field(default_factory=Camera)
     environment: Environment = field(default_factory=Environment)
@@ -117,9 +125,17 @@ class Scene:
     objects: tuple[Object, ...] = ()
     settings: RenderSettings = RenderSettings()
     lights: tuple[Light, ...] = ()
+    camera_name: str = CAMERA_NAME
+    cameras: Mapping[str, Camera] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         require("camera", self.camera, Camera, "a Camera")
+        require("camera_name", self.camera_name, str, "a name; name the camera by a text")
+        require("cameras", self.cameras, Mapping, "a mapping of names to Cameras")
+        cameras = {**self.cameras, self.camera_name: self.camera}
+        _require_all("cameras", cameras, str, "a name; name each by a text")
+        _require_all("cameras", cameras.values(), Camera, "a Camera")
+        object.__setattr__(self, "cameras", MappingProxyType(cameras))
         require("environment", self.environment, Environment, "an Environment")
         require("materials", self.materials, Mapping, "a mapping of names to Materials")
         require("settings", self.settings, RenderSettings, "RenderSettings")
@@ -217,12 +233,33 @@ class Scene:
             raise InputError(f"material {described(name)} is not in the scene; {_known(self.materials)}")
         return self.materials[name]
 
-    def with_camera(self, **changes: Any) -> Scene:
-        """A scene whose camera has other values: see Camera for their names. A new `fov_y` ends a focal
-        length, unless one is given too."""
+    def with_camera(self, name: str | None = None, /, **changes: Any) -> Scene:
+        """A scene with a changed camera, or with a new one of that name; None is the active one. See Camera
+        for what it has. A new `fov_y` ends a focal length, unless one is given too."""
+        require("name", name, (str, NoneType), "the name of a camera")
+        name = self.camera_name if name is None else name
         if "fov_y" in changes:
             changes = {"focal_length": 0.0, **changes}
-        return replace(self, camera=_replace(self.camera, changes))
+        camera = _replace(self.cameras.get(name, Camera()), changes)
+        if name == self.camera_name:
+            return replace(self, camera=camera)
+        return replace(self, cameras={**self.cameras, name: camera})
+
+    def with_active_camera(self, name: str) -> Scene:
+        """A scene that is seen through another of its cameras. Raises InputError."""
+        if not isinstance(name, str) or name not in self.cameras:
+            raise InputError(f"camera {described(name)} is not in the scene; {_known(self.cameras)}")
+        return replace(self, camera=self.cameras[name], camera_name=name)
+
+    def without_camera(self, name: str) -> Scene:
+        """A scene without one of its cameras, seen through the first of the others where that was the active
+        one. Raises InputError."""
+        self.with_active_camera(name)
+        others = {other: camera for other, camera in self.cameras.items() if other != name}
+        if not others:
+            raise InputError(f"camera {name!r}: is the only one; add another before")
+        active = next(iter(others)) if self.camera_name == name else self.camera_name
+        return replace(self, camera=others[active], camera_name=active, cameras=others)
 
     def with_environment(self, **changes: Any) -> Scene:
         """A scene whose environment has other values: color, image, rotation_y, intensity."""
@@ -279,10 +316,12 @@ class Scene:
         return {
             **{k: v for k, v in self.__dict__.items() if k not in ("object_index", "light_index")},
             "materials": dict(self.materials),
+            "cameras": dict(self.cameras),
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state, materials=MappingProxyType(state["materials"]))
+        mappings = {name: MappingProxyType(state[name]) for name in ("materials", "cameras")}
+        self.__dict__.update(state, **mappings)
 
 
 def _require_all(name: str, values: Collection[object], kind: type, wanted: str) -> None:

@@ -50,7 +50,9 @@ def describe(scene: Scene) -> list[str]:
         bounds = np.stack([o.world_bounds for o in scene.objects])
         low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
         lines.append(f"bounds: {_described_point(low)} to {_described_point(high)} metres")
-    lines.append(f"camera: {_described_camera(scene.camera, scene.settings.size)}")
+    others = len(scene.cameras) - 1
+    count = f" ({scene.camera_name}, the active one of {others + 1})" if others else ""
+    lines.append(f"camera{count}: {_described_camera(scene.camera, scene.settings.size)}")
     return lines + [f"warning: {problem}" for problem in scene_problems(scene)]
 
 

@@ -119,6 +119,17 @@ def test_the_command_line_wins_over_the_scene(
     assert only_line(capsys.readouterr().out) == f"{output}: 33 x 17, 3 samples per pixel"
 
 
+def test_a_camera_is_chosen_by_its_name(scene_file: Path, tmp_path: Path) -> None:
+    scene = registry.load(scene_file).with_camera("top", position=(0, 9, 0.1))
+    two = tmp_path / "two.toml"
+    scene_save.save(scene, two)
+    assert run("render", two, "-o", tmp_path / "a.exr", "--spp", 1, "--camera", "top") == 0
+    session = Session(scene.with_active_camera("top"))
+    session.render(1)
+    assert np.array_equal(read_exr(tmp_path / "a.exr"), session.image())
+    assert run("render", two, "-o", tmp_path / "b.exr", "--camera", "side") == 2
+
+
 def test_the_seed_chooses_the_samples(scene_file: Path, tmp_path: Path) -> None:
     pictures = []
     for seed, name in ((0, "a"), (0, "b"), (1, "c")):

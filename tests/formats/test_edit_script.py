@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -113,7 +114,9 @@ BALL = "[[edits]]\nobject = 'ball'\n"
         ("cumulative = 1\n" + BALL, "cumulative: 1 is not true or false"),
         ("[[edits]]\nstep = 0\n", r"\[\[edits\]\] 1: has no target; give one of object, material"),
         ("[[edits]]\nmaterial = 'red'\ncamera = true\n", "has material and camera; give one of"),
-        ("[[edits]]\ncamera = 'front'\nfov_y = 3\n", "camera: 'front' is not true; write camera = true"),
+        ("[[edits]]\ncamera = 'front'\nfov_y = 3\n", "camera 'front' is not in the scene; it has camera"),
+        ("[[edits]]\ncamera = 3\nfov_y = 3\n", "camera: 3 is not true; write camera = true"),
+        ("[[edits]]\ncamera = true\nactive = false\n", "active: False is not true; leave it out"),
         (BALL, r"\[\[edits\]\] 1: changes nothing; give new values, such as position"),
         (
             BALL + "positoin = [0, 0, 0]\n",
@@ -161,3 +164,24 @@ def test_several_meshes_need_a_part(tmp_path: Path) -> None:
         load_text(tmp_path, BALL + "mesh = 'two.glb'\n")
     script = load_text(tmp_path, BALL + "mesh = 'two.glb'\npart = 'b'\n")
     assert script.scenes(SCENE)[0].object("ball").mesh.source.part == "b"
+
+
+def test_edits_of_cameras_by_name(tmp_path: Path) -> None:
+    scene = SCENE.with_camera("top", position=(0, 9, 0.1))
+    path = tmp_path / "edits.toml"
+    path.write_text("""
+        [[edits]]
+        camera = "top"
+        fov_y = 20
+        [[edits]]
+        camera = "top"
+        active = true
+        f_stop = 0.5
+        [[edits]]
+        camera = true
+        near = 0.1
+        """)  # fmt: skip
+    first, second, third = load_edits(path, scene).scenes(scene)
+    assert first.camera == scene.camera and first.cameras["top"].fov_y == 20
+    assert second.camera_name == "top" and second.camera == replace(first.cameras["top"], f_stop=0.5)
+    assert third.camera == replace(second.camera, near=0.1) and third.cameras["camera"] == scene.camera

@@ -67,6 +67,7 @@ def load_text(folder: Path, text: str) -> Scene:
 def assert_same(a: Scene, b: Scene) -> None:
     """Equal, with meshes and images compared by content: a new file gives new ones."""
     assert (a.camera, a.settings, dict(a.materials)) == (b.camera, b.settings, dict(b.materials))
+    assert a.camera_name == b.camera_name and list(a.cameras.items()) == list(b.cameras.items())
     assert replace(a.environment, image=None) == replace(b.environment, image=None)
     assert (a.environment.image is None) == (b.environment.image is None)
     if a.environment.image is not None and b.environment.image is not None:
@@ -89,6 +90,43 @@ def test_a_scene_file_gives_what_it_says(tmp_path: Path) -> None:
     cube = scene.object("red cube")
     assert cube.mesh is shape("cube") and cube.scale == (1, 2, 1) and not cube.visible
     assert scene.material("a lamp") == Material(emission=(1, 2, 3), double_sided=True, priority=2)
+
+
+CAMERAS = """
+version = 1
+active_camera = "the top"
+[environment]
+color = [1, 1, 1]
+[materials.red]
+[[objects]]
+name = "red cube"
+shape = "cube"
+material = "red"
+[cameras.front]
+position = [0, 1, 9]
+[cameras."the top"]
+position = [0, 9, 0.1]
+projection = "orthographic"
+"""
+
+
+def test_a_scene_may_have_several_cameras(tmp_path: Path) -> None:
+    scene = load_text(tmp_path, CAMERAS)
+    assert list(scene.cameras) == ["front", "the top"] and scene.camera_name == "the top"
+    assert scene.camera == Camera((0, 9, 0.1), projection="orthographic") == scene.cameras["the top"]
+    assert scene.cameras["front"] == Camera((0, 1, 9))
+    assert load_text(tmp_path, CAMERAS.replace('active_camera = "the top"', "")).camera_name == "front"
+    both = load_text(tmp_path, VALID + "[cameras.top]\nfov_y = 20\n")
+    assert list(both.cameras) == ["camera", "top"] and both.camera_name == "camera"
+    for one in (scene, both, scene.with_active_camera("front"), scene.without_camera("front")):
+        scene_save.save(one, tmp_path / "b.toml")
+        assert_same(registry.load(tmp_path / "b.toml"), one)
+
+
+def test_a_scene_of_one_camera_is_saved_as_before(tmp_path: Path) -> None:
+    scene_save.save(Scene(Camera(fov_y=33)), tmp_path / "a.toml")
+    text = (tmp_path / "a.toml").read_text()
+    assert "[camera]" in text and "cameras" not in text and "active" not in text and "shift" not in text
 
 
 @pytest.mark.parametrize("rows", [SHEARED, [*SHEARED, [0, 0, 0, 1]]])
@@ -311,6 +349,13 @@ OBJECT = '[[objects]]\nname = "b"\nmaterial = "red"\n'
         ("version = 1\n[camera]\nposition = {x = 1, y = 2, z = 3}\n", "is not a list of three"),
         ("version = 1\n[camera]\nposition = 1979-05-27\n", "is not a list of three"),
         ("version = 1\n[camera]\nup = [0, 0, 0]\n", r"\[camera\]: up: has no length"),
+        ("version = 1\n[camera]\nblades = 2\n", r"\[camera\]: blades: 2 make no aperture; use 3 or more"),
+        ("version = 1\ncameras = 3\n", r"cameras: is not a table"),
+        ("version = 1\n[cameras]\ntop = 3\n", r"\[cameras.top\]: is not a table"),
+        ("version = 1\n[cameras.top]\nfov = 3\n", r"\[cameras.top\]: fov: is no known key"),
+        ("version = 1\n[camera]\n[cameras.camera]\n", r"\[cameras.camera\]: is the name of the table"),
+        ("version = 1\nactive_camera = 'x'\n", r"active_camera: 'x' is not in \[cameras\]; it has camera"),
+        ("version = 1\nactive_camera = 3\n", r"active_camera: 3 is not a text"),
         ("version = 1\n[environment]\ncolor = [-1, 0, 0]\n", r"\[environment\]: color: -1 is out of range"),
         ("version = 1\n[environment]\nintensity = nan\n", "intensity: nan is not a finite number"),
         (
@@ -494,6 +539,8 @@ def scenes(draw: st.DrawFn) -> Scene:
         materials,
         tuple(objects),
         settings,
+        draw(names),
+        {name: draw(lenses(position)) for name in draw(st.lists(names, max_size=2))},
     )
 
 

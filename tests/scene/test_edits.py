@@ -244,3 +244,17 @@ def test_unique_names_are_unique(taken: list[str]) -> None:
     for name in ("a", "a.001", "1.001", ".001"):
         new = edits.unique_name(name, taken)
         assert new not in taken and (new == name) == (name not in taken)
+
+
+def test_cameras_are_added_and_renamed() -> None:
+    view = replace(SCENE.camera, fov_y=20)
+    scene, name = edits.add_camera(SCENE, view)
+    assert name == "camera.001" == scene.camera_name and scene.camera == view
+    assert dict(scene.cameras) == {"camera": SCENE.camera, "camera.001": view}
+    renamed = edits.rename_camera(scene, "camera.001", "close")
+    assert renamed.camera_name == "close" and list(renamed.cameras) == ["camera", "close"]
+    assert list(edits.rename_camera(renamed, "camera", "far").cameras) == ["far", "close"]
+    assert edits.rename_camera(renamed, "close", "close") == renamed
+    for new in ("camera", ""):
+        with pytest.raises(InputError):
+            edits.rename_camera(renamed, "close", new)

@@ -70,6 +70,35 @@ def test_objects_come_go_and_change_places() -> None:
     assert renamed.added == {"box"} and renamed.removed == {"cube"} and renamed.objects == {"box", "cube"}
 
 
+def test_the_active_camera_is_one_of_all() -> None:
+    front, top = SCENE.camera, Camera((0, 9, 0.1))
+    scene = SCENE.with_camera("top", position=top.position)
+    assert dict(scene.cameras) == {"camera": front, "top": top} and scene.camera == front
+    assert diff(SCENE, scene) == Change()  # it is not seen through
+    above = scene.with_active_camera("top")
+    assert above.camera == top and diff(scene, above) == Change(camera=True)
+    # What is changed of the active one is changed in its place.
+    tilted = replace(above, camera=replace(top, fov_y=20))
+    assert list(tilted.cameras) == ["camera", "top"] and tilted.cameras["top"].fov_y == 20
+    assert above.with_camera(fov_y=20) == tilted == above.with_camera("top", fov_y=20)
+    assert tilted.without_camera("top") == SCENE and scene.without_camera("top") == SCENE
+    assert dict(above.without_camera("camera").cameras) == {"top": top}
+    with pytest.raises(InputError, match="is the only one; add another before"):
+        SCENE.without_camera("camera")
+    for wrong in ("side", 3):
+        with pytest.raises(InputError, match="is not in the scene; it has camera, top"):
+            scene.with_active_camera(wrong)  # type: ignore[arg-type]
+    for copied in (copy.deepcopy(above), pickle.loads(pickle.dumps(above))):
+        assert (copied.camera_name, dict(copied.cameras)) == ("top", dict(above.cameras))
+
+
+def test_a_new_angle_ends_a_focal_length() -> None:
+    long = SCENE.with_camera(focal_length=85)
+    assert long.camera.focal_length == 85
+    assert long.with_camera(fov_y=30).camera == replace(SCENE.camera, fov_y=30)
+    assert long.with_camera(fov_y=30, focal_length=50).camera.focal_length == 50
+
+
 def test_global_changes() -> None:
     assert diff(SCENE, SCENE.with_camera(fov_y=50)) == Change(camera=True)
     assert diff(SCENE, SCENE.with_environment(rotation_y=50)) == Change(environment=True)

@@ -299,8 +299,13 @@ def flat(value: Any, place: str = "") -> dict[str, Any]:
     """Every number, text and array of a scene or of preferences by its place: "objects.cube.position.0"."""
     if isinstance(value, (Mesh, Image, Bitmap)) or value is None:
         return {place: value}
-    if is_dataclass(value):
-        parts: Iterator[tuple[str, Any]] = ((f.name, getattr(value, f.name)) for f in fields(value))
+    parts: Iterator[tuple[str, Any]]
+    if isinstance(value, Scene):
+        # The active camera stands among all cameras too.
+        others = {name: one for name, one in value.cameras.items() if name != value.camera_name}
+        parts = ((f.name, others if f.name == "cameras" else getattr(value, f.name)) for f in fields(value))
+    elif is_dataclass(value):
+        parts = ((f.name, getattr(value, f.name)) for f in fields(value))
     elif isinstance(value, Mapping):
         parts = ((str(key), one) for key, one in value.items())
     elif isinstance(value, tuple):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from incpt.scene import camera_moves, edits
+from incpt.ui.dialogs.text_field import TextField
 from incpt.ui.editor.editor import Editor
 
 
@@ -18,8 +19,57 @@ def frame_selected(editor: Editor) -> None:
 
 
 def reset_camera(editor: Editor) -> None:
-    """The camera of the file, or of the scene that the document began with."""
-    editor.propose(replace(editor.scene, camera=editor.document.first_scene.camera), "Reset camera")
+    """The active camera as in the file, or in the scene that the document began with; one that was not there
+    gets the view that was active then."""
+    first = editor.document.first_scene
+    camera = first.cameras.get(editor.scene.camera_name, first.camera)
+    editor.propose(replace(editor.scene, camera=camera), "Reset camera")
+
+
+def focus_selected(editor: Editor) -> None:
+    """Make the middle of what is selected sharp, or of everything."""
+    bounds = edits.bounds_of(editor.scene, editor.selection.names)
+    if bounds is None:
+        return
+    camera = editor.scene.camera
+    depth = float((bounds.mean(axis=0) - camera.position) @ camera.image_plane(1.0)[2])
+    if depth <= 0:
+        editor.say("It lies behind the camera; turn the camera to it first", "warning")
+        return
+    editor.propose(editor.scene.with_camera(focus_distance=depth), "Focus on selected")
+
+
+def new_camera(editor: Editor) -> None:
+    """Another camera with the view as it is, through which the scene is seen."""
+    scene, _ = edits.add_camera(editor.scene, editor.scene.camera, editor.scene.camera_name)
+    editor.propose(scene, "New camera")
+
+
+def next_camera(editor: Editor) -> None:
+    """See the scene through the next of its cameras."""
+    names = list(editor.scene.cameras)
+    name = names[(names.index(editor.scene.camera_name) + 1) % len(names)]
+    activate(editor, name)
+
+
+def activate(editor: Editor, name: str) -> None:
+    """See the scene through a camera."""
+    editor.propose(editor.scene.with_active_camera(name), f"Camera {name}")
+
+
+def delete_camera(editor: Editor) -> None:
+    """Delete the active camera."""
+    editor.propose(editor.scene.without_camera(editor.scene.camera_name), "Delete camera")
+
+
+def rename_camera(editor: Editor) -> None:
+    """Ask for another name of the active camera."""
+    old = editor.scene.camera_name
+
+    def give(name: str) -> None:
+        editor.propose(edits.rename_camera(editor.scene, old, name), "Rename camera")
+
+    editor.dialog = TextField("Rename camera", "Name", old, give)
 
 
 def look_from(editor: Editor, side: str) -> None:

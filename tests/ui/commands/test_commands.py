@@ -103,15 +103,16 @@ def test_every_command_runs_everywhere(one: Command, where: str, selected: int) 
 
 NEEDS_SELECTION = {"Duplicate", "Delete", "Rename…", "Hide", "Reset transform"}
 NEEDS_PICTURE = {"Export picture…", "Copy picture", "Pin reference"}
+NEEDS_CAMERAS = {"Next camera"}
 
 
 def test_what_is_disabled(user: Desk) -> None:
     disabled = {one.name for one in COMMANDS if not one.is_enabled(user.editor)}
-    assert disabled == NEEDS_SELECTION | NEEDS_PICTURE | {"Undo", "Redo"}
+    assert disabled == NEEDS_SELECTION | NEEDS_PICTURE | NEEDS_CAMERAS | {"Undo", "Redo"}
     user.editor.select(Selection(("lamp",)))
     user.run("Delete")
     disabled = {one.name for one in COMMANDS if not one.is_enabled(user.editor)}
-    assert disabled == NEEDS_SELECTION | NEEDS_PICTURE | {"Redo"}
+    assert disabled == NEEDS_SELECTION | NEEDS_PICTURE | NEEDS_CAMERAS | {"Redo"}
 
 
 def test_what_a_command_refuses_is_a_message(user: Desk) -> None:

@@ -26,6 +26,9 @@ from incpt.viewer.renderer import Pin, Restart
 SCENE = mixed_scene(size=(48, 32), strategy="spiral").with_material(
     "red", normal_texture=A_TEXTURE, alpha_mode="mask"
 )
+LENS = SCENE.with_camera(focal_length=35.0, f_stop=2.8, focus_distance=2.0, blades=5, near=0.1)
+TALL = LENS.with_camera(sensor_fit="vertical")
+PARALLEL = SCENE.with_camera(projection="orthographic").with_camera("top", position=(0, 9, 0.1))
 PREFERENCES = Preferences(
     display=DisplaySettings(overlay="spp"), snap=SnapSettings(enabled=True), navigation="blender"
 )
@@ -45,6 +48,7 @@ class Field:
     selected: str = "red cube"
     dragged: float = 30.0
     across: float = 0.5
+    scene: Scene | None = None
 
     def __str__(self) -> str:
         return f"{self.panel}: {self.label} {self.place[-1]}"
@@ -84,6 +88,17 @@ FIELDS = [
     *vector("Scene", "Camera", "scene.camera.position"),
     *vector("Scene", "Target", "scene.camera.target"),
     Field("Scene", "Field of view", "scene.camera.fov_y", "60", 60),
+    Field("Scene", "Shift X", "scene.camera.shift_x", "0.25", 0.25),
+    Field("Scene", "Shift Y", "scene.camera.shift_y", "-0.25", -0.25),
+    Field("Scene", "Near", "scene.camera.near", "0.25", 0.25),
+    Field("Scene", "Focal length", "scene.camera.focal_length", "50", 50, scene=LENS),
+    Field("Scene", "Sensor", "scene.camera.sensor_width", "24", 24, scene=LENS),
+    Field("Scene", "Sensor", "scene.camera.sensor_height", "18", 18, scene=TALL),
+    Field("Scene", "F-stop", "scene.camera.f_stop", "1.4", 1.4, scene=LENS),
+    Field("Scene", "Focus distance", "scene.camera.focus_distance", "3.5", 3.5, scene=LENS),
+    Field("Scene", "Blades", "scene.camera.blades", "7", 7, scene=LENS, dragged=60),
+    Field("Scene", "Blade turn", "scene.camera.blade_rotation", "-15", -15, scene=LENS),
+    Field("Scene", "View height", "scene.camera.ortho_height", "3.5", 3.5, scene=PARALLEL),
     *colour("Scene", "Colour", "scene.environment.color"),
     Field("Scene", "Intensity", "scene.environment.intensity", "2.5", 2.5),
     Field("Scene", "Turn", "scene.environment.rotation_y", "-90", -90),
@@ -159,6 +174,9 @@ NOT_AT_FIRST = {f"Remove##{name}" for name in TEXTURES if name != "normal_textur
 ELSEWHERE = {
     "Name", "Uniform scale", "Emission colour", "Emission strength", "New##material", "Duplicate##material",
     "Frame selected##camera", "Reset##camera", "Pin this picture", "Remove##normal_texture",
+    "Active camera", "New from view##camera",
+    "Rename…##camera", "Delete##camera", "Lens", "Sensor fit", "Projection", "Depth of field",
+    "Focus on selected##camera",
 }  # fmt: skip
 """Tested below, one by one."""
 
@@ -175,8 +193,9 @@ def test_every_parameter_of_a_material_has_a_row() -> None:
 
 
 @pytest.fixture
-def user() -> Iterator[Desk]:
-    with desk(SCENE, PREFERENCES) as made:
+def user(request: pytest.FixtureRequest) -> Iterator[Desk]:
+    field = getattr(request.node, "callspec", None) and request.node.callspec.params.get("field")
+    with desk(getattr(field, "scene", None) or SCENE, PREFERENCES) as made:
         made.editor.select(Selection(("red cube",)))
         made.frames(2)
         yield made
@@ -288,7 +307,11 @@ def test_what_is_no_number_changes_nothing(user: Desk, field: Field, typed: str)
 @pytest.mark.parametrize("typed", ["1e999", "-1e999", "-1e12", "1e12"])
 @pytest.mark.parametrize(
     "field",
-    [f for f in FIELDS if f.panel in ("Object", "Scene") and is_scene(f.place) and f.label != "Priority"],
+    [
+        f
+        for f in FIELDS
+        if f.panel in ("Object", "Scene") and is_scene(f.place) and f.label not in ("Priority", "Blades")
+    ],
     ids=str,
 )
 def test_a_number_out_of_range_is_refused_with_a_remark(user: Desk, field: Field, typed: str) -> None:
@@ -371,10 +394,12 @@ def test_a_button_does_one_thing(user: Desk, panel: str, label: str, changed: se
 def test_every_widget_of_the_panels_is_tested(user: Desk) -> None:
     tested = {f.label for f in FIELDS} | {label for _, label, *_ in (*CHOICES, *CHECKBOXES, *BUTTONS)}
     shown: set[str] = set()
-    for panel, selected in (
-        ("Object", "red cube"), ("Object", "glass ball"), ("Object", "lamp"),
-        ("Scene", "lamp"), ("Render", "lamp"), ("Method", "lamp"),
+    for panel, selected, scene in (
+        ("Object", "red cube", SCENE), ("Object", "glass ball", SCENE), ("Object", "lamp", SCENE),
+        ("Scene", "lamp", SCENE), ("Scene", "lamp", LENS), ("Scene", "lamp", PARALLEL),
+        ("Render", "lamp", SCENE), ("Method", "lamp", SCENE),
     ):  # fmt: skip
+        user.editor.propose(scene, "Scene")
         turn_to(user, panel, selected)
         shown |= {
             name
@@ -593,3 +618,99 @@ def test_pinning_asks_the_renderer(user: Desk) -> None:
     assert not user.editor.rendering.is_pinned and user.null.requests == []  # there is no picture yet
     user.run("Pin reference")
     assert user.null.requests == [] and Pin(True) not in user.null.requests
+
+
+def test_the_field_of_view_is_said_in_two_ways(user: Desk) -> None:
+    turn_to(user, "Scene")
+    before, scene = state(user.editor), user.scene
+    width, height = scene.settings.size
+    user.choose("Lens", "Focal length")
+    camera = user.scene.camera
+    assert camera.focal_length > 0 and camera.fov_y_at(width / height) == pytest.approx(scene.camera.fov_y)
+    assert changes(before, state(user.editor)) == {"scene.camera.focal_length"}
+    assert user.shows("Sensor") and not user.shows("Field of view")
+    user.choose("Sensor fit", "Height")
+    assert user.scene.camera == replace(camera, sensor_fit="vertical")
+    user.type("Focal length", "50")
+    camera = user.scene.camera
+    user.type("Focal length", "0")  # which would stand for the angle
+    assert user.scene.camera == camera and camera.focal_length == 50
+    user.choose("Lens", "Angle")
+    assert user.scene.camera.focal_length == 0
+    assert user.scene.camera.fov_y == pytest.approx(camera.fov_y_at(width / height))
+    assert user.undo_count == 4
+
+
+def test_another_projection_keeps_the_size_of_the_target(user: Desk) -> None:
+    turn_to(user, "Scene")
+    scene = user.scene
+    width, height = scene.settings.size
+    user.choose("Projection", "Orthographic")
+    camera = user.scene.camera
+    right, up, _ = scene.camera.image_plane(width / height)
+    point = np.array(scene.camera.target) + 0.3 * (right + up)
+    for place in (camera.target, point):
+        seen = [c.project(np.array([place]), width / height)[0] for c in (camera, scene.camera)]
+        assert seen[0][0] == pytest.approx(seen[1][0], abs=1e-6)
+    assert_one_edit(user, scene)
+    user.choose("Projection", "Perspective")
+    assert user.scene.camera == replace(scene.camera, ortho_height=camera.ortho_height)
+
+
+def test_depth_of_field_is_opened_and_focused(user: Desk) -> None:
+    turn_to(user, "Scene")
+    scene = user.scene
+    assert not user.shows("F-stop")
+    user.click("Depth of field")
+    assert user.scene.camera == replace(scene.camera, f_stop=2.8) and user.undo_count == 1
+    user.click("Focus on selected##camera")
+    camera, cube = user.scene.camera, user.scene.object("red cube")
+    depth = (cube.world_bounds.mean(axis=0) - camera.position) @ camera.image_plane(1.0)[2]
+    assert camera.focus_distance == pytest.approx(depth) and user.undo_count == 2
+    user.editor.propose(user.scene.with_camera(target=(0, 1.4, 9)), "Turn")
+    user.frame()
+    before = user.scene
+    user.click("Focus on selected##camera")
+    assert user.scene is before and "lies behind the camera" in user.texts()[0]
+    user.click("Depth of field")
+    assert user.scene.camera.f_stop == 0
+
+
+@pytest.mark.parametrize(("start", "dragged", "lands"), [(0, 15.0, 3), (3, -15.0, 0)])
+def test_there_is_no_aperture_of_one_or_two_blades(
+    user: Desk, start: int, dragged: float, lands: int
+) -> None:
+    turn_to(user, "Scene")
+    seen = set()
+    for step in range(1, 8):
+        user.editor.propose(user.scene.with_camera(f_stop=2.0, blades=start), "Lens")
+        user.frames(2)
+        user.hold_at(user.place("Blades", 0.5), (dragged * step, 0.0))
+        seen.add(user.scene.camera.blades)
+        user.release()
+        user.frame()
+    assert lands in seen and not seen & {1, 2} and user.texts() == []
+
+
+def test_cameras_are_made_chosen_renamed_and_deleted(user: Desk) -> None:
+    turn_to(user, "Scene")
+    scene = user.scene
+    user.click("Delete##camera")  # it is the only one
+    assert user.scene is scene
+    user.click("New from view##camera")
+    assert user.scene.camera_name == "camera.001" and user.scene.camera == scene.camera
+    user.type("Camera X", "2.5")
+    assert user.scene.cameras["camera"] == scene.camera and user.scene.camera.position[0] == 2.5
+    user.choose("Active camera", "camera")
+    assert user.scene.camera == scene.camera and user.null.views[-1].scene.camera == scene.camera
+    user.run("Next camera")
+    assert user.scene.camera_name == "camera.001"
+    user.click("Reset##camera")  # it was not there at first
+    assert user.scene.camera == scene.camera
+    user.click("Rename…##camera")
+    assert user.editor.dialog is not None
+    user.key("Escape")
+    user.frames(2)
+    user.click("Delete##camera")
+    assert dict(user.scene.cameras) == {"camera": scene.camera} and user.scene == scene
+    assert user.undo_count == 6
