@@ -377,7 +377,7 @@ STAGE void finish_paths(const Block *block, BlockRay *ray) {
     const uint count = ray->count;
     LANES
     for (int i = 0; i < (int)count; i++)
-        finish_path(&block->shading, &block->state, i, load_result(&block->state, i));
+        finish_path(block->params, &block->shading, &block->state, i, load_result(&block->state, i));
     ray->count = 0;
 }
 #endif

@@ -1,4 +1,5 @@
 #include "path/surface_emission.cl"
+#include "path/clamp.cl"
 
 // What happens where a ray ends on an opaque surface: the path gathers what is emitted there, asks for a
 // shadow ray towards a light, and goes on in a direction that the material chooses.
@@ -10,28 +11,31 @@
 // straight-line code of scalars, so that PoCL runs it in SIMD lanes.
 
 // The end of paths on rays after which no path goes on: they gather emission only.
-INLINE void finish_path(const Shading *shading, const State *state, uint path, uint result) {
+INLINE void finish_path(const Params *params, const Shading *shading, const State *state, uint path,
+                        uint result) {
     Vec3 direction = load_ray(state->rays, STRIDE(state), path).direction;
     Surface surface = load_surface(state, path);
     Path p = load_path(state, path);
     float facing = -dot(surface.geometric, direction);
     SurfaceMaterial material = surface_material(shading, &surface);
     Vec3 emitted = surface_emission(shading, &surface, &material, facing, p.bsdf_pdf);
-    accumulate(state, result, mul(p.throughput, emitted));
+    accumulate(state, result, CLAMPED(params, mul(p.throughput, emitted), finds_indirect(&p)));
     store_class(state, path, 0u);
 }
 
 #ifdef LIGHT_SAMPLING
 // Makes a shadow ray of the light that was sampled for the path, if the light is on the side of the surface
 // that the path has come to. Returns CLASS_SHADOW where the ray brings something, else 0.
-INLINE uint light_surface(const State *state, uint path, const OpaqueBsdf *bsdf, Frame frame, Vec3 wo,
-                          Vec3 geometric, Vec3 origin, Vec3 throughput, int scatters) {
+INLINE uint light_surface(const Params *params, const State *state, uint path, const Path *p,
+                          const OpaqueBsdf *bsdf, Frame frame, Vec3 wo, Vec3 geometric, Vec3 origin,
+                          int scatters) {
     LightSample light = load_light_sample(state, path);
     BsdfValue value = eval_bsdf(bsdf, wo, to_local(frame, light.direction));
     int lit = scatters & (light.pdf > 0.0f) & (value.pdf > 0.0f) & (dot(geometric, light.direction) > 0.0f);
     float pdf = lit ? light.pdf : 1.0f;
     float weight = light_sampling_weight(pdf, value.pdf) / pdf;
-    Vec3 arriving = mul(mul(throughput, value.f_cos), scale(weight, light.radiance));
+    Vec3 arriving = mul(mul(p->throughput, value.f_cos), scale(weight, light.radiance));
+    arriving = CLAMPED(params, arriving, samples_indirect(p));
     store_shadow_ray(state, path, origin, arriving);
     return (lit & (largest(arriving) > 0.0f)) ? CLASS_SHADOW : 0u;
 }
@@ -51,7 +55,7 @@ INLINE void shade_path(const Params *params, const Shading *shading, const State
 #endif
     float facing = orient_surface(&surface, direction, mirrors);
     Vec3 emitted = surface_emission(shading, &surface, &material, facing, p.bsdf_pdf);
-    accumulate(state, result, mul(p.throughput, emitted));
+    accumulate(state, result, CLAMPED(params, mul(p.throughput, emitted), finds_indirect(&p)));
 
     Vec3 wo;
     Frame frame = shading_frame(&surface, direction, &wo);
@@ -64,8 +68,8 @@ INLINE void shade_path(const Params *params, const Shading *shading, const State
     Uniform2 choices = uniform_2d(seed, p.sample, PAIR_CHOICE(p.ray));
     uint path_class = 0u;
 #ifdef LIGHT_SAMPLING
-    path_class = light_surface(state, path, &bsdf, frame, wo, surface.geometric, next_ray.origin,
-                               p.throughput, scatters);
+    path_class = light_surface(params, state, path, &p, &bsdf, frame, wo, surface.geometric, next_ray.origin,
+                               scatters);
 #endif
 
     // BSDF sampling: the next ray.
@@ -98,7 +102,7 @@ __kernel void shade(LAUNCH_PARAMETERS, LIST_PARAMETERS, SHADING_PARAMETERS, PATH
     const Shading shading = {SHADING_ARGUMENTS};
     const WorkItem item = listed_path(&params, lengths[length_place], list);
 #ifdef EMISSION_ONLY
-    finish_path(&shading, &state, item.path, item.result);
+    finish_path(&params, &shading, &state, item.path, item.result);
 #else
     shade_path(&params, &shading, &state, item.path, item.result);
 #endif

@@ -1,3 +1,4 @@
+#include "path/clamp.cl"
 #include "path/state.cl"
 #ifdef SHAPED_LIGHTS
 #include "scene/shaped_light.cl"
@@ -18,7 +19,8 @@ INLINE void shade_light_path(const Params *params, const Shading *shading, const
     throughput = mul(throughput, transmittance(shading->materials, medium, distance));
 #endif
     ShapedLight light = load_shaped_light(params, emitters, light_index);
-    accumulate(state, result, mul(throughput, shaped_radiance(&light, ray, distance, p.bsdf_pdf)));
+    Vec3 arriving = mul(throughput, shaped_radiance(&light, ray, distance, p.bsdf_pdf));
+    accumulate(state, result, CLAMPED(params, arriving, finds_indirect(&p)));
 }
 
 // Adds the radiance of a sun, if the path's ray, which has left the scene, leads to it.
@@ -33,7 +35,7 @@ INLINE void shade_sun_path(const Params *params, const Shading *shading, const E
 #endif
     ShapedLight light = load_shaped_light(params, emitters, light_index);
     Vec3 radiance = sun_radiance(&light, direction, p.ray == 0u, p.bsdf_pdf);
-    accumulate(state, result, mul(throughput, radiance));
+    accumulate(state, result, CLAMPED(params, mul(throughput, radiance), finds_indirect(&p)));
 }
 
 // The light that a path's ray meets before `*distance`, with the distance to it; NO_INDEX: it meets none.

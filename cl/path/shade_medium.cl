@@ -1,4 +1,5 @@
 #include "path/surface_emission.cl"
+#include "path/clamp.cl"
 #include "shading/dielectric.cl"
 
 // What happens where a ray ends on a transparent body, or inside one: absorption on the way, then the
@@ -13,9 +14,9 @@ typedef struct {
 
 // Makes a shadow ray of the light that was sampled for a path at a rough boundary. A path on an `opaque`
 // surface keeps the light sample, which `shade` needs. Returns whether the ray brings something.
-INLINE int light_boundary(__global const Material *materials, const State *state, uint path,
-                          const Boundary *boundary, Frame frame, Vec3 wo, const Surface *surface,
-                          Vec3 throughput, BoundaryMedia media, int opaque) {
+INLINE int light_boundary(const Params *params, __global const Material *materials, const State *state,
+                          uint path, const Path *p, const Boundary *boundary, Frame frame, Vec3 wo,
+                          const Surface *surface, Vec3 throughput, BoundaryMedia media, int opaque) {
     LightSample light = load_light_sample(state, path);
     BsdfValue value = eval_rough_boundary(boundary, wo, to_local(frame, light.direction));
     float above = dot(surface->geometric, light.direction);
@@ -24,6 +25,7 @@ INLINE int light_boundary(__global const Material *materials, const State *state
     float weight = light_sampling_weight(pdf, value.pdf) / pdf;
     Vec3 passed = transmittance(materials, above > 0.0f ? media.near : media.far, light.distance);
     Vec3 arriving = mul(mul(mul(throughput, value.f_cos), scale(weight, light.radiance)), passed);
+    arriving = CLAMPED(params, arriving, samples_indirect(p));
     float offset = above > 0.0f ? surface->offset : -surface->offset;
     store_shadow_ray(state, path, along(surface->position, offset, surface->geometric),
                      select(opaque, light.radiance, arriving));
@@ -48,7 +50,8 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
     int opaque = luck.v >= material.transmission;
     float facing = orient_surface(&surface, direction, 1);
     Vec3 emitted = surface_emission(shading, &surface, &material, facing, p.bsdf_pdf);
-    accumulate(state, result, select(opaque, vec3(0.0f, 0.0f, 0.0f), mul(throughput, emitted)));
+    Vec3 found = CLAMPED(params, mul(throughput, emitted), finds_indirect(&p));
+    accumulate(state, result, select(opaque, vec3(0.0f, 0.0f, 0.0f), found));
 
     // The media on both sides. A ray that leaves a body which it never entered has started inside of it.
     int outside = facing > 0.0f;
@@ -78,8 +81,8 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
 #ifdef LIGHT_SAMPLING
     // Light sampling, where the boundary has a density for it.
     int scatters = (!covered) & (!smooth) & (!opaque) & (p.bounces <= params->max_bounces);
-    int lit =
-        light_boundary(materials, state, path, &boundary, frame, wo, &surface, throughput, media, opaque);
+    int lit = light_boundary(params, materials, state, path, &p, &boundary, frame, wo, &surface, throughput,
+                             media, opaque);
     path_class = scatters & lit ? CLASS_SHADOW : 0u;
 #endif
     BsdfSample rough =

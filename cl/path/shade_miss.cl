@@ -1,6 +1,7 @@
 #include "path/state.cl"
 #include "path/shade_light.cl"
 #include "scene/light.cl"
+#include "path/clamp.cl"
 
 // Radiance from far away for a path whose ray left the scene, weighted against light sampling of the
 // environment. The path ends with it. The variant MEDIA serves scenes with transparent bodies: from inside
@@ -18,7 +19,7 @@ INLINE void shade_miss_path(const Params *params, const Shading *shading, const 
     float light_pdf;
     Vec3 arriving = eval_environment(params, emitters, direction, &light_pdf);
     float weight = bsdf_sampling_weight(p.bsdf_pdf, light_pdf);
-    accumulate(state, result, mul(throughput, scale(weight, arriving)));
+    accumulate(state, result, CLAMPED(params, mul(throughput, scale(weight, arriving)), finds_indirect(&p)));
 }
 
 #ifndef BLOCKS

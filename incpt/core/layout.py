@@ -755,6 +755,7 @@ PARAMS = _packed(
         ("transmission_bounces", np.uint32),
         ("roulette_depth", np.uint32),
         ("multiple_scattering", np.float32),  # 1, or 0: light that scatters again on rough metal is lost
+        ("clamp_indirect", np.float32),  # with CLAMP_INDIRECT: see cl/path/clamp.cl
         ("light_count", np.uint32),
         ("environment_probability", np.float32),  # of sampling the environment instead of a triangle
         ("shaped_count", np.uint32),  # lights that are objects of their own

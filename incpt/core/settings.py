@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -28,6 +29,9 @@ class RenderSettings:
     roulette_depth        scattering events before Russian roulette may end a path.
     multiple_scattering   whether light that meets several microfacets of rough metal goes on; else it is
                           lost, as in renderers that scatter once.
+    clamp_indirect        the most that a sample adds at once after the first bounce, as the mean of red,
+                          green and blue; 0: all. It takes away fireflies and the light that they stand
+                          for, so that the picture gets darker than it should be: biased, as in Cycles.
     tile_size             edge of a tile, pixels.
     nor                   repetitions of a tile while an edit is re-rendered, under "spiral" (NoR of
                           INCREMENTAL).
@@ -51,6 +55,7 @@ class RenderSettings:
     transmission_bounces: int = 12
     roulette_depth: int = 4
     multiple_scattering: bool = True
+    clamp_indirect: float = 0.0
     tile_size: int = 16
     nor: int = 256
     nor_adapts: bool = True
@@ -74,6 +79,7 @@ class RenderSettings:
             if name == "slots_per_step" and value is None:
                 continue
             object.__setattr__(self, name, whole(name, value, low, high))
+        object.__setattr__(self, "clamp_indirect", _radiance("clamp_indirect", self.clamp_indirect))
         require_bool("multiple_scattering", self.multiple_scattering)
         require_bool("aovs", self.aovs)
         require_bool("nor_adapts", self.nor_adapts)
@@ -86,6 +92,7 @@ class RenderSettings:
         return tuple(field.name for field in fields(cls))
 
 
+_MOST_RADIANCE = 1e9
 _RANGES: dict[str, tuple[int, int]] = {
     "max_bounces": (0, 200),
     "transmission_bounces": (0, 200),
@@ -97,6 +104,18 @@ _RANGES: dict[str, tuple[int, int]] = {
     "slots_per_step": (1, 1 << 24),
     "seed": (0, (1 << 32) - 1),
 }
+
+
+def _radiance(name: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise InputError(f"{name}: {described(value)} is not a number")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not 0 <= number <= _MOST_RADIANCE:
+        raise InputError(f"{name}: {described(value)} is out of range; use 0 to {_MOST_RADIANCE:g}")
+    return number
 
 
 def _whole_pair(value: Any) -> tuple[int, int]:
@@ -115,6 +134,7 @@ CUT_OFF_WORTH_TELLING = 1e-2
 """The share of paths that end because `transmission_bounces` is used up from which people are told."""
 
 PICTURE_SETTINGS = (
-    *("max_bounces", "transmission_bounces", "roulette_depth", "multiple_scattering", "seed"),
+    *("max_bounces", "transmission_bounces", "roulette_depth", "multiple_scattering", "clamp_indirect"),
+    "seed",
 )
 """Settings that change what a sample is worth, so that what was accumulated cannot be kept."""

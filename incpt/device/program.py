@@ -47,6 +47,7 @@ FEATURES = {
     "VERTEX_COLORS": "Some mesh has colours at its corners.",
     "AOVS": "Paths write base colour and normal of the first surface into the path buffer.",
     "CHANGES": "Blocks tell of each path whether it met something that changed between two scenes.",
+    "CLAMP_INDIRECT": "What a path adds after its first bounce is held below a limit.",
     "EMISSION_ONLY": "No path goes on after this ray, so that surfaces only emit.",
     "COUNT_VISITS": "Traversal counts the nodes and packs that it tests, for the benchmark of rays.",
     "MIS_ONLY_LIGHT": "Light sampling alone brings light, where it can, for the tests of its weights.",

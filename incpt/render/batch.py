@@ -56,7 +56,11 @@ class Batch:
     @property
     def features(self) -> tuple[str, ...]:
         """What chooses the variants of the kernels that trace these paths; see `program.FEATURES`."""
-        asked = {"AOVS": self.aovs, "CHANGES": self.touch_test is not None}
+        asked = {
+            "AOVS": self.aovs,
+            "CHANGES": self.touch_test is not None,
+            "CLAMP_INDIRECT": self.params["clamp_indirect"] > 0,
+        }
         return (*self.tables.variant, *(name for name, is_asked in asked.items() if is_asked))
 
     @property

@@ -25,7 +25,7 @@ def path_params(
     params["width"], params["height"] = width, height
     params["in_squares"] = tables.has_trees
     for name in ("tile_size", "seed", "max_bounces", "transmission_bounces", "roulette_depth",
-                 "multiple_scattering"):  # fmt: skip
+                 "multiple_scattering", "clamp_indirect"):  # fmt: skip
         params[name] = getattr(settings, name)
     return params
 

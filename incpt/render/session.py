@@ -420,7 +420,8 @@ class Session:
     @property
     def _of_pictures(self) -> tuple[str, ...]:
         """What tells the kernels that pictures need from those of other scenes and settings."""
-        return (*self._tables.variant, *map(str, passes_of(self.settings)))
+        clamps = ("CLAMP_INDIRECT",) if self.settings.clamp_indirect > 0 else ()
+        return (*self._tables.variant, *clamps, *map(str, passes_of(self.settings)))
 
     @property
     def _of_edits(self) -> tuple[str, ...]:

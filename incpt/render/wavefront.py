@@ -40,19 +40,19 @@ _PLANES = {
 }
 _CLASSES = {path_list: PathClass[path_list.name] for path_list in PathList}
 """Which paths are in which list."""
-_SHAPED = "SHAPED_LIGHTS"
+_SHAPED, _CLAMP = "SHAPED_LIGHTS", "CLAMP_INDIRECT"
 _LIGHTS = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS", _SHAPED)
 _TEXTURES = ("TEXTURES", "VERTEX_COLORS")
 _TRACED = (*_TEXTURES, "CUTOUTS")
 """Of first hits, which pass through lights."""
 _FEATURES: Mapping[str | None, tuple[str, ...]] = {
     "generate": ("LENS",),
-    "intersect": (*_TRACED, _SHAPED, "MEDIA"),
-    "shade_miss": (*_LIGHTS, "MEDIA"),
+    "intersect": (*_TRACED, _SHAPED, "MEDIA", _CLAMP),
+    "shade_miss": (*_LIGHTS, "MEDIA", _CLAMP),
     "sample_lights": (*_LIGHTS, *_TEXTURES),
     "touch_lights": (*_LIGHTS, *_TEXTURES),
-    "shade_medium": (*_LIGHTS, *_TEXTURES),
-    "shade": (*_LIGHTS, *_TEXTURES),
+    "shade_medium": (*_LIGHTS, *_TEXTURES, _CLAMP),
+    "shade": (*_LIGHTS, *_TEXTURES, _CLAMP),
     "write_aovs": _TEXTURES,
     "first_hits": _TEXTURES,
     "trace_shadow": (*_TRACED, _SHAPED),
@@ -277,7 +277,7 @@ def _launches_of(features: tuple[str, ...]) -> tuple[_StageLaunch, ...]:
 def _features_of(stage: Stage, features: tuple[str, ...]) -> tuple[str, ...]:
     """Those that choose the variant of the stage's kernel."""
     if When.ENDS in stage.when:
-        return ("EMISSION_ONLY", *_chosen(features, _TEXTURES))
+        return ("EMISSION_ONLY", *_chosen(features, (*_TEXTURES, _CLAMP)))
     names = _FEATURES.get(stage.kernel, ())
     if stage.kernel == "intersect" and _SHAPED not in features:
         names = _TRACED

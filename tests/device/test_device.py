@@ -282,7 +282,8 @@ VARIANTS = [
     (*LIGHTS, *RESTRICTIONS[:3], "MATTE"),
     (*LIGHTS, "MEDIA", *RESTRICTIONS),
     (*LIGHTS, *RESTRICTIONS[:3]),
-    (*LIGHTS, *RESTRICTIONS[:3], "LENS"),
+    (*LIGHTS, *RESTRICTIONS[:3], "LENS", "CLAMP_INDIRECT"),
+    (*LIGHTS, "MEDIA", "CLAMP_INDIRECT"),
     (*LIGHTS, *RESTRICTIONS[1:2]),
     ("TRIANGLE_LIGHTS", "MEDIA", *RESTRICTIONS, "PORTABLE_LANES"),
     ("TRIANGLE_LIGHTS", "PORTABLE_LANES"),
@@ -331,7 +332,7 @@ __kernel WIDE void roots(__local float *plane, uint count) {
 def test_kernels_build_without_warnings(device: Device) -> None:
     if not device.is_clang_cpu:
         pytest.skip("other compilers warn of code that is made for clang on a CPU")
-    variants = [*VARIANTS, ("EMISSION_ONLY",)]
+    variants = [*VARIANTS, ("EMISSION_ONLY",), ("EMISSION_ONLY", "CLAMP_INDIRECT")]
     for file, path in program.files().items():
         text = program.source(path)
         if "__kernel" not in text:

@@ -36,6 +36,10 @@ _FOUND_TIP = (
 )
 _CUT_OFF_TIP = "Their light is missing; raise Glass bounces"
 _ADAPTS_TIP = "NoR is the most: tiles get what the rest of the picture has, and the object's come at once"
+_CLAMP_TIP = (
+    "Against fireflies: the most that a sample adds at once after its first bounce; 0: all. Biased: it makes "
+    "the picture darker than it should be"
+)
 _WITHOUT_NOR = "The strategy that is chosen repeats no tiles"
 _TILE_SIZES = (8, 16, 32, 64, 128)
 """Tile sizes that are offered, in pixels."""
@@ -158,6 +162,8 @@ def draw_settings(settings: RenderSettings, refusals: Refusals) -> RenderSetting
         if name == "nor" and strategy_of(settings).uses_nor:
             adapts = widgets.checkbox("NoR adapts", settings.nor_adapts, _ADAPTS_TIP)
             settings = refusals.changed(settings, nor_adapts=adapts)
+    clamp = widgets.number("Clamp indirect", settings.clamp_indirect, high=1e6, speed=0.02, tip=_CLAMP_TIP)
+    settings = refusals.changed(settings, clamp_indirect=clamp)
     width = widgets.whole_number("Width", settings.size[0], low=16, high=8192, speed=2.0, tip="Pixels")
     height = widgets.whole_number("Height", settings.size[1], low=16, high=8192, speed=2.0, tip="Pixels")
     return refusals.changed(settings, size=(width, height))

@@ -107,6 +107,7 @@ FIELDS = [
     Field("Render", "Sample rate", "scene.settings.sample_rate", "4", 4, dragged=60),
     Field("Render", "Bounces", "scene.settings.max_bounces", "9", 9, dragged=60),
     Field("Render", "Glass bounces", "scene.settings.transmission_bounces", "3", 3, dragged=60),
+    Field("Render", "Clamp indirect", "scene.settings.clamp_indirect", "2.5", 2.5),
     Field("Render", "Seed", "scene.settings.seed", "12345", 12345, dragged=60),
     Field("Render", "Width", "scene.settings.size.0", "100", 100, dragged=60),
     Field("Render", "Height", "scene.settings.size.1", "70", 70, dragged=60),
