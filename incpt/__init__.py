@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from incpt.scene.mesh import Mesh as Mesh, MeshSource as MeshSource
     from incpt.scene.model import Object as Object, Scene as Scene
     from incpt.scene.shapes import shape as shape
+    from incpt.scene.sky import Sky as Sky
     from incpt.scene.texture import Bitmap as Bitmap, BitmapSource as BitmapSource, Texture as Texture
     from incpt.scene.transform import Transform as Transform
 
@@ -67,6 +68,7 @@ _HOMES = {
     "RenderSettings": "core.settings",
     "Scene": "scene.model",
     "Session": "render.session",
+    "Sky": "scene.sky",
     "Snapshot": "render.session",
     "StepReport": "render.session",
     "Texture": "scene.texture",

@@ -41,7 +41,7 @@ def scene_dict(
     integrator = {"type": "path", "max_depth": max_depth, "rr_depth": rr_depth}
     shapes |= {f"light_{i}": light(one) for i, one in enumerate(scene.lights) if one.is_emissive}
     # A black environment would be given half of the light samples.
-    dark = scene.environment.image is None and not any(scene.environment.radiance)
+    dark = scene.environment.picture is None and not any(scene.environment.radiance)
     sky = {} if dark else {"environment": emitter(scene.environment)}
     return {
         "type": "scene", "integrator": integrator, "sensor": sensor(scene.camera, size), **sky, **shapes,
@@ -215,9 +215,12 @@ def write_ply(
 def emitter(environment: Environment) -> dict[str, Any]:
     """Constant, or an image. Mitsuba's rows lie at v = j / (height - 1), ours at (j + 1/2) / height: twice
     the rows and one more hold exactly what we interpolate."""
-    if environment.image is None:
+    if environment.has_sun:
+        raise ValueError("the sun of a sky has no counterpart in Mitsuba")
+    picture = environment.picture
+    if picture is None:
         return {"type": "constant", "radiance": {"type": "rgb", "value": list(environment.radiance)}}
-    pixels = environment.image.pixels * np.array(environment.radiance, np.float32)
+    pixels = picture.pixels * np.array(environment.radiance, np.float32)
     padded = np.concatenate([pixels[:1], pixels, pixels[-1:]])
     rows = np.empty((2 * len(pixels) + 1, *pixels.shape[1:]), np.float32)
     rows[1::2], rows[0::2] = pixels, (padded[:-1] + padded[1:]) / 2

@@ -1,5 +1,6 @@
 #include "base/sampling.cl"
 #include "scene/light_sample.cl"
+#include "scene/sun.cl"
 #include "base/texture.cl"
 #ifdef SHAPED_LIGHTS
 #include "scene/shaped_light.cl"
@@ -72,7 +73,15 @@ INLINE Vec3 eval_environment(const Params *params, const Emitters *emitters, Vec
 #ifdef ENVIRONMENT_IMAGE
     Uniform2 place = environment_place(params, direction);
     *pdf = environment_pdf(params, emitters, place);
+#ifdef SUN
+    int sunny = meets_sun(params, direction);
+    Vec3 sun = vec3(params->sun_radiance[0], params->sun_radiance[1], params->sun_radiance[2]);
+    *pdf = *pdf * (1.0f - params->sun_probability) +
+           (sunny ? sun_pdf(params) * params->sun_probability * params->environment_probability : 0.0f);
+    return mul(color, add(image_radiance(params, emitters, place), scale(sunny ? 1.0f : 0.0f, sun)));
+#else
     return mul(color, image_radiance(params, emitters, place));
+#endif
 #else
     *pdf = 0.0f;
     return color;
@@ -82,6 +91,10 @@ INLINE Vec3 eval_environment(const Params *params, const Emitters *emitters, Vec
 #ifdef ENVIRONMENT_IMAGE
 INLINE LightSample sample_environment(const Params *params, const Emitters *emitters, Uniform2 uv) {
     uint width = params->environment_width, height = params->environment_height;
+#ifdef SUN
+    int sunny = chooses_sun(params, &uv.u);
+    Vec3 to_sun = sample_sun(params, uv);
+#endif
     uint row = find_cell(emitters->marginal, height, uv.v);
     float low = emitters->marginal[row], high = emitters->marginal[row + 1u];
     __global const float *cells = emitters->conditional + row * (width + 1u);
@@ -92,6 +105,9 @@ INLINE LightSample sample_environment(const Params *params, const Emitters *emit
     place.u = ((float)column + (uv.u - left) / MAX(right - left, 1e-30f)) / (float)width;
     LightSample result;
     result.direction = environment_direction(params, place);
+#ifdef SUN
+    result.direction = select(sunny, to_sun, result.direction);
+#endif
     result.distance = INFINITY;
     // Looked up by the direction, as for a ray that goes there, so that both techniques agree on the texel.
     result.radiance = eval_environment(params, emitters, result.direction, &result.pdf);

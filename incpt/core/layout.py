@@ -765,6 +765,13 @@ PARAMS = _packed(
         ("environment_width", np.uint32),
         ("environment_height", np.uint32),
         ("environment_rotation", np.float32),  # as a fraction of a full turn
+        # With SUN, see cl/scene/sun.cl: towards it, turned as the image is, unit length; radiance, times
+        # `environment_color`; chord from its middle to its rim on the unit sphere; its share of the samples
+        # of the environment.
+        ("sun_direction", np.float32, (3,)),
+        ("sun_radiance", np.float32, (3,)),
+        ("sun_chord", np.float32),
+        ("sun_probability", np.float32),
         ("listed", np.uint32),  # 1: paths take their places in the slots from a list
         ("last_ray", np.uint32),  # number of the ray with which all paths end, see stages.py
         ("sees_sky", np.uint32),  # 1: light comes from far away

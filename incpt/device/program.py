@@ -33,6 +33,7 @@ FEATURES = {
     "PERTURBED_DIVISION": "Reciprocals of directions are two ulps off, for the tests of that slack.",
     "LENS": "Camera rays start at different points: of a thin lens, an orthographic picture or a near plane.",
     "ENVIRONMENT_IMAGE": "The environment is an image, of which lights are sampled.",
+    "SUN": "The image is a sky, in which the sun shines.",
     "TRIANGLE_LIGHTS": "There are emissive triangles, of which lights are sampled.",
     "SHAPED_LIGHTS": "There are lights that are objects of their own.",
     "MEDIA": "There are materials that let light through.",

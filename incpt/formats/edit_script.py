@@ -14,7 +14,9 @@ pixel = [480, 270]          # optional: the point of change, for point_of_change
 capture = [0, 30]           # optional: instead of the file's
 ```
 
-A camera has the key `active` as well: the scene is seen through it from then on.
+A camera has the key `active` as well: the scene is seen through it from then on. The `sky` of an environment
+is a table with the keys of the scene file, such as `sky = {sun_elevation = 5}`; what it leaves out is as
+usual.
 """
 
 from __future__ import annotations
@@ -37,6 +39,7 @@ from incpt.formats.scene_toml import (
     MATERIAL_KEYS,
     MESH_KEYS,
     PLACEMENT_KEYS,
+    sky_of,
 )
 from incpt.formats.toml_kit import check_keys, quoted, read_toml, text_of
 from incpt.scene.model import Scene
@@ -205,6 +208,8 @@ def _changes(values: dict[str, Any], library: MeshLibrary) -> dict[str, Any]:
         with in_place("image"):
             name = text_of(changes, "image", "name an OpenEXR file")
             changes["image"] = images.load_image(library.folder / name)
+    if "sky" in changes:
+        changes["sky"] = sky_of(changes["sky"])
     if "active" in changes and changes["active"] is not True:
         raise InputError(
             f"active: {changes['active']!r} is not true; leave it out, or make another one active"

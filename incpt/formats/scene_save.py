@@ -199,6 +199,9 @@ def _environment_table(environment: Environment, beside: _Beside) -> dict[str, A
         table["image"] = beside.image(environment.image)
     for name in ("rotation_y", "intensity"):
         table[name] = getattr(environment, name)
+    if environment.sky is not None:
+        # What it looks like most by is said always.
+        table["sky"] = {"sun_elevation": environment.sky.sun_elevation, **_changed(environment.sky)}
     return table
 
 

@@ -23,6 +23,7 @@ from incpt.scene.environment import Environment
 from incpt.scene.light import KINDS, Light
 from incpt.scene.material import Material
 from incpt.scene.model import CAMERA_NAME, Object, Scene
+from incpt.scene.sky import Sky
 
 _T = TypeVar("_T")
 VERSION = 2
@@ -30,6 +31,7 @@ VERSION = 2
 _READ = (1, 2)
 _TABLES = ("version", "camera", "cameras", "active_camera", "environment", "render", "materials", "objects", "lights")
 CAMERA_KEYS = tuple(field.name for field in fields(Camera))
+SKY_KEYS = tuple(field.name for field in fields(Sky))
 ENVIRONMENT_KEYS = tuple(field.name for field in fields(Environment))
 MATERIAL_KEYS = tuple(field.name for field in fields(Material))
 PLACEMENT_KEYS = ("position", "rotation", "scale", "matrix", "visible")
@@ -109,7 +111,18 @@ def _environment(table: dict[str, Any], folder: Path) -> Environment:
             name = text_of({"image": values["image"]}, "image", "name an OpenEXR file")
             values["image"] = images.load_image(folder / name)
         values.setdefault("color", (1.0, 1.0, 1.0))
+    if "sky" in values:
+        values["sky"] = sky_of(values["sky"])
+        values.setdefault("color", (1.0, 1.0, 1.0))
     return Environment(**values)
+
+
+def sky_of(table: Any) -> Sky:
+    """The sky of a table. Raises InputError."""
+    with in_place("sky"):
+        if not isinstance(table, dict):
+            raise InputError("is not a table; write [environment.sky] and its keys below")
+        return _built(Sky, table, SKY_KEYS)
 
 
 def _materials(tables: dict[str, Any], folder: Path) -> dict[str, Material]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -71,7 +73,14 @@ def launch_params(params: npt.NDArray[np.void], tables: SceneTables) -> npt.NDAr
     params["shaped_probability"] = shaped.probability
     params["environment_probability"] = tables.environment_probability
     params["environment_color"] = tables.environment_radiance
-    if environment.image is not None:
-        params["environment_height"], params["environment_width"] = environment.image.pixels.shape[:2]
+    if environment.picture is not None:
+        params["environment_height"], params["environment_width"] = environment.picture.pixels.shape[:2]
     params["environment_rotation"] = environment.rotation_y / 360 % 1
+    if environment.sky is not None and environment.has_sun:
+        x, y, z = environment.sky.sun_direction
+        angle = math.radians(environment.rotation_y)
+        sine, cosine = math.sin(angle), math.cos(angle)
+        params["sun_direction"] = (x * cosine + z * sine, y, z * cosine - x * sine)
+        params["sun_radiance"], params["sun_chord"] = environment.sky.sun_radiance, environment.sky.sun_chord
+        params["sun_probability"] = tables.sun_probability
     return params

@@ -48,8 +48,8 @@ _TRACED = (*_TEXTURES, "CUTOUTS")
 _FEATURES: Mapping[str | None, tuple[str, ...]] = {
     "generate": ("LENS",),
     "intersect": (*_TRACED, _SHAPED, "MEDIA", _CLAMP),
-    "shade_miss": (*_LIGHTS, "MEDIA", _CLAMP),
-    "sample_lights": (*_LIGHTS, *_TEXTURES),
+    "shade_miss": (*_LIGHTS, "SUN", "MEDIA", _CLAMP),
+    "sample_lights": (*_LIGHTS, "SUN", *_TEXTURES),
     "touch_lights": (*_LIGHTS, *_TEXTURES),
     "shade_medium": (*_LIGHTS, *_TEXTURES, _CLAMP),
     "shade": (*_LIGHTS, *_TEXTURES, _CLAMP),

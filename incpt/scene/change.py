@@ -13,6 +13,7 @@ from itertools import compress, count
 from operator import is_not
 
 from incpt.core.checks import require
+from incpt.scene.environment import Environment
 from incpt.scene.light import Light
 from incpt.scene.mesh import is_deformation
 from incpt.scene.model import Object, Placed, Scene
@@ -72,12 +73,11 @@ def diff(old: Scene, new: Scene) -> Change:
     )
     common = [name for name in after if name in before and after[name] is not before[name]]
     pairs = [(name, before[name], after[name]) for name in common]
-    old_image, new_image = old.environment.image, new.environment.image
     lights = _changed_lights(old, new)
     return Change(
         camera=old.camera != new.camera,
         environment=old.environment != new.environment,
-        environment_image=old_image is not new_image,
+        environment_image=not _has_same_picture(old.environment, new.environment),
         materials=frozenset(
             name
             for name in old.materials.keys() & new.materials.keys()
@@ -116,6 +116,13 @@ def _changed_lights(old: Scene, new: Scene) -> list[Light]:
 def _as_it_shines(light: Light) -> Light:
     """The light without what makes no difference: where a sun stands."""
     return replace(light, transform=Transform(rotation=light.rotation)) if light.is_far else light
+
+
+def _has_same_picture(old: Environment, new: Environment) -> bool:
+    """Whether the tables of the one serve for the other. The picture of a sky is not made for that."""
+    if old.sky is not None and new.sky is not None:
+        return old.sky.atmosphere == new.sky.atmosphere and old.has_sun == new.has_sun
+    return old.sky is new.sky and old.image is new.image
 
 
 def _without_equal_ends(

@@ -262,7 +262,11 @@ class Scene:
         return replace(self, camera=others[active], camera_name=active, cameras=others)
 
     def with_environment(self, **changes: Any) -> Scene:
-        """A scene whose environment has other values: color, image, rotation_y, intensity."""
+        """A scene whose environment has other values: color, image, rotation_y, intensity, sky. A new image
+        takes the place of a sky, and a new sky that of an image."""
+        for new, old in (("image", "sky"), ("sky", "image")):
+            if changes.get(new) is not None:
+                changes = {old: None, **changes}
         return replace(self, environment=_replace(self.environment, changes))
 
     def with_material(self, name: str, /, **changes: Any) -> Scene:

@@ -19,9 +19,9 @@ def scene_problems(scene: Scene) -> list[str]:
     problems = []
     if not scene.objects and not scene.lights:
         problems.append("the scene has no objects: the picture shows the environment only")
-    lit = any(c > 0 for c in scene.environment.radiance) and (
-        scene.environment.image is None or bool(scene.environment.image.pixels.any())
-    )
+    picture = scene.environment.picture
+    is_bright = picture is None or bool(picture.pixels.any()) or scene.environment.has_sun
+    lit = any(c > 0 for c in scene.environment.radiance) and is_bright
     lit = lit or any(light.is_emissive for light in scene.lights)
     if not lit and not any(o.visible and scene.materials[o.material].is_emissive for o in scene.objects):
         problems.append(
@@ -69,6 +69,8 @@ def _described_lights(scene: Scene) -> str:
 
 def _described_environment(environment: Environment) -> str:
     colour = f"radiance {_described_point(environment.radiance)}"
+    if environment.sky is not None:
+        return f"{colour} times a sky with the sun at {environment.sky.sun_elevation:g} degrees"
     if environment.image is None:
         return colour if any(environment.radiance) else "none"
     height, width = environment.image.pixels.shape[:2]

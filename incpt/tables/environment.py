@@ -16,15 +16,19 @@ from incpt.tables.alias import luminance
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentTables:
-    """The buffers of the environment's image, by name, and whether there is one that is not black."""
+    """The buffers of the environment's image, by name, and whether there is one that is not black, or in
+    which a sun shines. `irradiance`: the luminance of the image, summed up over the sphere."""
 
     buffers: Mapping[str, cl.Buffer]
     has_image: bool
+    irradiance: float = 0.0
 
 
-def environment_tables(device: Device, image: Image | None) -> EnvironmentTables:
-    """Those of an environment with that image, or without one."""
+def environment_tables(device: Device, image: Image | None, has_sun: bool = False) -> EnvironmentTables:
+    """Those of an environment with that image, or without one; `has_sun`: a sun shines beside it."""
     table = None if image is None else image_density(image)
+    if image is not None and table is None and has_sun:
+        table = image_density(Image(np.ones_like(image.pixels)))
     if image is None or table is None:
         nothing = np.zeros(1, np.float32)
         arrays = dict.fromkeys(("environment_image", "marginal", "conditional", "texel_pdf"), nothing)
@@ -36,7 +40,14 @@ def environment_tables(device: Device, image: Image | None) -> EnvironmentTables
             "texel_pdf": table.texel_pdf,
         }
     buffers = {name: device.upload(array) for name, array in arrays.items()}
-    return EnvironmentTables(buffers, table is not None)
+    return EnvironmentTables(buffers, table is not None, 0.0 if image is None else _irradiance(image))
+
+
+def _irradiance(image: Image) -> float:
+    """The luminance of a lat-long image, summed up over the sphere."""
+    height, width = image.pixels.shape[:2]
+    rows = luminance(image.pixels).sum(axis=1) * np.sin((np.arange(height) + 0.5) * np.pi / height)
+    return float(rows.sum() * (np.pi / height) * (2 * np.pi / width))
 
 
 @dataclass(frozen=True, eq=False)

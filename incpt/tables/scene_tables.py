@@ -27,7 +27,7 @@ from incpt.tables.attributes import AttributeTable, attribute_table
 from incpt.tables.environment import EnvironmentTables, environment_tables
 from incpt.tables.geometry_pool import GeometryPool, PooledMesh
 from incpt.tables.light_pairs import has_same_emitters, paired_light_tables
-from incpt.tables.lights import LightTables, light_tables
+from incpt.tables.lights import LightTables, light_tables, luminance
 from incpt.tables.materials import MaterialTables, material_tables
 from incpt.tables.object_table import NO_OBJECTS, PlacedObjects
 from incpt.tables.textures import TextureTables, texture_tables
@@ -78,6 +78,7 @@ class SceneTables:
         """The preprocessor names that choose a variant of the shading kernels."""
         names = {
             "ENVIRONMENT_IMAGE": self._has_image_light,
+            "SUN": self._has_image_light and self.scene.environment.has_sun,
             "TRIANGLE_LIGHTS": self.light_count > 0,
             "SHAPED_LIGHTS": self.lights.shaped.count > 0,
         }
@@ -137,11 +138,21 @@ class SceneTables:
         return self.lights.environment_probability
 
     @property
+    def sun_probability(self) -> float:
+        """The chance that samples of the environment turn to the sun of its sky, where that shines: its share
+        of the light, but neither forgets the other."""
+        sky = self.scene.environment.sky
+        if sky is None or not sky.has_sun:
+            return 0.0
+        sun = float(luminance(sky.sun_irradiance))
+        return min(max(sun / (sun + self.environment.irradiance), 0.1), 0.9)
+
+    @property
     def environment_radiance(self) -> Vector:
         """The constant radiance of the environment, or the factor of its image."""
         environment = self.scene.environment
         # An image that is black all over has no table, and is not told from a missing one on the device.
-        black = environment.image is not None and not self.environment.has_image
+        black = environment.picture is not None and not self.environment.has_image
         return (0.0, 0.0, 0.0) if black else environment.radiance
 
     @cached_property
@@ -241,7 +252,10 @@ def _make(pool: GeometryPool, scene: Scene, previous: SceneTables | None) -> Sce
         "top_level",
         lambda: top_level_tables(device, objects.table, lambda mesh: meshes[mesh].built.quads(mesh)),
     )
-    environment = part("environment", lambda: environment_tables(device, scene.environment.image))
+    environment = part(
+        "environment",
+        lambda: environment_tables(device, scene.environment.picture, scene.environment.has_sun),
+    )
     textures = part("textures", lambda: texture_tables(device, scene.materials))
     attributes = part("attributes", lambda: attribute_table(pool, scene, meshes, textures.slots != 0))
     # Lights need the environment, and materials the densities of the lights; both need the textures.

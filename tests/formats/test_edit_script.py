@@ -17,6 +17,7 @@ from incpt.scene.environment import Environment
 from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
+from incpt.scene.sky import Sky
 
 SCENE = Scene(
     environment=Environment((1, 1, 1)),
@@ -185,3 +186,11 @@ def test_edits_of_cameras_by_name(tmp_path: Path) -> None:
     assert first.camera == scene.camera and first.cameras["top"].fov_y == 20
     assert second.camera_name == "top" and second.camera == replace(first.cameras["top"], f_stop=0.5)
     assert third.camera == replace(second.camera, near=0.1) and third.cameras["camera"] == scene.camera
+
+
+def test_an_edit_of_the_sky(tmp_path: Path) -> None:
+    script = load_text(tmp_path, "[[edits]]\nenvironment = true\nsky = {sun_elevation = 5, dust = 2}\n")
+    (scene,) = script.scenes(SCENE)
+    assert scene.environment == replace(SCENE.environment, sky=Sky(5, dust=2))
+    with pytest.raises(InputError, match="sky: sun: is no known key"):
+        load_text(tmp_path, "[[edits]]\nenvironment = true\nsky = {sun = 5}\n")

@@ -30,6 +30,7 @@ from incpt.scene.material import ALPHA_MODES, Material
 from incpt.scene.mesh import Mesh, MeshSource
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
+from incpt.scene.sky import Sky
 from incpt.scene.texture import FILTERS, WRAPS, Bitmap, Texture
 from incpt.scene.transform import Transform
 
@@ -121,6 +122,17 @@ def test_a_scene_may_have_several_cameras(tmp_path: Path) -> None:
     for one in (scene, both, scene.with_active_camera("front"), scene.without_camera("front")):
         scene_save.save(one, tmp_path / "b.toml")
         assert_same(registry.load(tmp_path / "b.toml"), one)
+
+
+def test_a_scene_may_have_a_sky(tmp_path: Path) -> None:
+    scene = load_text(
+        tmp_path, VALID.replace("color = [1, 1, 1]", "[environment.sky]\nsun_elevation = 7\ndust = 3")
+    )
+    assert scene.environment == Environment((1, 1, 1), sky=Sky(7, dust=3))
+    dimmed = scene.with_environment(intensity=0.1, rotation_y=30)
+    for one in (dimmed, dimmed.with_environment(sky=Sky(sun_disc=False, ground=0.0))):
+        scene_save.save(one, tmp_path / "b.toml")
+        assert registry.load(tmp_path / "b.toml").environment == one.environment
 
 
 def test_a_scene_of_one_camera_is_saved_as_before(tmp_path: Path) -> None:
@@ -350,6 +362,9 @@ OBJECT = '[[objects]]\nname = "b"\nmaterial = "red"\n'
         ("version = 1\n[camera]\nposition = 1979-05-27\n", "is not a list of three"),
         ("version = 1\n[camera]\nup = [0, 0, 0]\n", r"\[camera\]: up: has no length"),
         ("version = 1\n[camera]\nblades = 2\n", r"\[camera\]: blades: 2 make no aperture; use 3 or more"),
+        ("version = 1\n[environment]\nsky = true\n", r"\[environment\]: sky: is not a table"),
+        ("version = 1\n[environment.sky]\nelevation = 3\n", r"sky: elevation: is no known key"),
+        ("version = 1\n[environment.sky]\nair = -3\n", r"\[environment\]: sky: air: -3 is out of range"),
         ("version = 1\ncameras = 3\n", r"cameras: is not a table"),
         ("version = 1\n[cameras]\ntop = 3\n", r"\[cameras.top\]: is not a table"),
         ("version = 1\n[cameras.top]\nfov = 3\n", r"\[cameras.top\]: fov: is no known key"),
@@ -482,6 +497,12 @@ def test_files_are_tried_with_every_parameter_of_materials() -> None:
     assert set(MATERIAL_VALUES) == {field.name for field in fields(Material)}
 
 
+skies = st.none() | st.builds(
+    Sky, st.floats(-90, 90), st.booleans(), st.floats(0.1, 30), st.floats(0, 10), st.floats(0, 5e4),
+    st.floats(0, 10), st.floats(0, 10), st.floats(0, 10), fractions,
+)  # fmt: skip
+
+
 @st.composite
 def lenses(draw: st.DrawFn, position: Any) -> Camera:
     """A camera with any of its fields."""
@@ -535,7 +556,7 @@ def scenes(draw: st.DrawFn) -> Scene:
     )
     return Scene(
         draw(lenses(position)),
-        Environment(draw(radiances), None, draw(numbers), draw(st.floats(0, LARGEST))),
+        Environment(draw(radiances), None, draw(numbers), draw(st.floats(0, LARGEST)), draw(skies)),
         materials,
         tuple(objects),
         settings,

@@ -24,6 +24,7 @@ from incpt.scene.light import Light
 from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
+from incpt.scene.sky import Sky
 from support.guarded import GuardedDevice
 from support.small_scenes import mixed_scene
 
@@ -114,6 +115,11 @@ def behind_a_lens() -> Scene:
     return mixed_scene().with_camera(f_stop=0.1, blades=5, near=0.1)
 
 
+def under_a_sky() -> Scene:
+    """One with a sun."""
+    return mixed_scene().with_environment(sky=Sky())
+
+
 SCENES: dict[str, Any] = {
     "empty": empty_glass,
     "flat": flat_box,
@@ -121,6 +127,7 @@ SCENES: dict[str, Any] = {
     "frosted": frosted,
     "lamps": lamps,
     "lens": behind_a_lens,
+    "sky": under_a_sky,
 }
 
 

@@ -17,6 +17,7 @@ from incpt.formats import bitmaps
 from incpt.scene.material import Material
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
+from incpt.scene.sky import Sky
 from incpt.ui.commands import files
 from incpt.ui.dialogs.path_dialog import PathDialog
 from incpt.ui.panels import textures
@@ -29,6 +30,7 @@ SCENE = mixed_scene(size=(48, 32), strategy="spiral").with_material(
 LENS = SCENE.with_camera(focal_length=35.0, f_stop=2.8, focus_distance=2.0, blades=5, near=0.1)
 TALL = LENS.with_camera(sensor_fit="vertical")
 PARALLEL = SCENE.with_camera(projection="orthographic").with_camera("top", position=(0, 9, 0.1))
+SKIED = SCENE.with_environment(sky=Sky(20, sun_size=2, altitude=10, dust=2, ground=0.5))
 PREFERENCES = Preferences(
     display=DisplaySettings(overlay="spp"), snap=SnapSettings(enabled=True), navigation="blender"
 )
@@ -102,6 +104,19 @@ FIELDS = [
     *colour("Scene", "Colour", "scene.environment.color"),
     Field("Scene", "Intensity", "scene.environment.intensity", "2.5", 2.5),
     Field("Scene", "Turn", "scene.environment.rotation_y", "-90", -90),
+    *(
+        Field("Scene", label, f"scene.environment.sky.{place}", "0.75", 0.75, dragged=30, scene=SKIED)
+        for label, place in (
+            ("Sun size", "sun_size"),
+            ("Sun strength", "sun_intensity"),
+            ("Air", "air"),
+            ("Dust", "dust"),
+            ("Ozone", "ozone"),
+            ("Ground", "ground"),
+        )
+    ),
+    Field("Scene", "Sun elevation", "scene.environment.sky.sun_elevation", "-2.5", -2.5, scene=SKIED),
+    Field("Scene", "Altitude", "scene.environment.sky.altitude", "1500", 1500, scene=SKIED),
     Field("Render", "NoR", "scene.settings.nor", "64", 64, dragged=60),
     Field("Render", "Base NoR", "scene.settings.base_nor", "4", 4, dragged=60),
     Field("Render", "Sample rate", "scene.settings.sample_rate", "4", 4, dragged=60),
@@ -177,7 +192,7 @@ ELSEWHERE = {
     "Frame selected##camera", "Reset##camera", "Pin this picture", "Remove##normal_texture",
     "Active camera", "New from view##camera",
     "Rename…##camera", "Delete##camera", "Lens", "Sensor fit", "Projection", "Depth of field",
-    "Focus on selected##camera",
+    "Focus on selected##camera", "Sky", "Sun disc",
 }  # fmt: skip
 """Tested below, one by one."""
 
@@ -322,9 +337,7 @@ def test_a_number_out_of_range_is_refused_with_a_remark(user: Desk, field: Field
     after = state(user.editor)
     assert changes(before, after) == {"notices"} and user.undo_count == 0
     (remark,) = after["notices"]
-    assert (
-        field.place.split(".")[3 if "objects" in field.place or "materials" in field.place else 2] in remark
-    )
+    assert [part for part in field.place.split(".") if not part.isdigit()][-1] in remark
     user.rest(1.0)
     assert user.texts() == [remark]  # long enough to be read
     user.rest(30.0)
@@ -398,6 +411,7 @@ def test_every_widget_of_the_panels_is_tested(user: Desk) -> None:
     for panel, selected, scene in (
         ("Object", "red cube", SCENE), ("Object", "glass ball", SCENE), ("Object", "lamp", SCENE),
         ("Scene", "lamp", SCENE), ("Scene", "lamp", LENS), ("Scene", "lamp", PARALLEL),
+        ("Scene", "lamp", SKIED),
         ("Render", "lamp", SCENE), ("Method", "lamp", SCENE),
     ):  # fmt: skip
         user.editor.propose(scene, "Scene")
@@ -715,3 +729,19 @@ def test_cameras_are_made_chosen_renamed_and_deleted(user: Desk) -> None:
     user.click("Delete##camera")
     assert dict(user.scene.cameras) == {"camera": scene.camera} and user.scene == scene
     assert user.undo_count == 6
+
+
+def test_a_sky_takes_the_place_of_an_image(user: Desk) -> None:
+    turn_to(user, "Scene")
+    scene = user.scene
+    assert scene.environment.image is not None and not user.shows("Sun elevation")
+    user.click("Sky")
+    environment = user.scene.environment
+    assert environment.sky == Sky() and environment.image is None and environment.color == (1, 1, 1)
+    assert 0 < environment.intensity < 1
+    assert_one_edit(user, scene)
+    before = state(user.editor)
+    user.click("Sun disc")
+    assert changes(before, state(user.editor)) == {"scene.environment.sky.sun_disc"}
+    user.click("Sky")
+    assert user.scene.environment.sky is None and not user.shows("Sun elevation")
