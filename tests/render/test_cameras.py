@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from support.kernels import device
-from support.pairs import session_of
+from support.pairs import check, session_of, traced_pairs
 from support.renders import render
 from support.small_scenes import mixed_scene
 
@@ -192,6 +192,44 @@ def test_an_edit_behind_a_lens_converges_to_a_fresh_render() -> None:
     assert error < 1.3 * np.sqrt((noise**2).mean() * 1.25)
     bias = (session.image() - mean).mean()
     assert abs(bias) < 5 * np.sqrt((noise**2).mean() * 1.25 / mean.size)
+
+
+def test_pixels_that_show_a_bit_of_what_changed_count_as_changed() -> None:
+    """Behind a lens that is as far as the blur reaches, whatever the middle of the lens sees."""
+    shown = []
+    for f_stop in (0.0, 0.1):
+        scene = mixed_scene(strategy="impact").with_camera(f_stop=f_stop, focus_distance=1.5)
+        session = Session(scene, device=device())
+        session.render(4)
+        session.edit(scene.with_material("red", base_color=(0.1, 0.2, 0.8)))
+        comparison = session._state.comparison
+        assert comparison is not None
+        shown.append(comparison.seen.changed)
+        with_colour = session.first_hits().object_id == scene.object_index["red cube"]
+        np.testing.assert_array_equal(shown[-1] & with_colour, with_colour)
+    y, x = np.nonzero(shown[0])
+    blur = scene.camera.blur(np.array([[0.0, 0.5, 0.0]]), 44 / 28)[0] * (44, 28)
+    # Every pixel within the blur of the cube's middle, across and down, is among them.
+    for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+        column = np.clip(x + int(dx * blur[0]), 0, 43)
+        row = np.clip(y + int(dy * blur[1]), 0, 27)
+        assert shown[1][row, column].all()
+    assert blur.min() > 2 and shown[1].sum() < shown[1].size
+
+
+@pytest.mark.parametrize("in_blocks", [True, False], ids=["blocks", "wavefront"])
+@pytest.mark.parametrize("near", [0.0, 2.2])
+def test_a_medium_around_the_near_plane_is_a_part_of_all_paths(near: float, in_blocks: bool) -> None:
+    """The camera itself stands outside of the body; where its rays start they are inside."""
+    clear = Material((1, 1, 1), roughness=0, transmission=1, ior=1.0, specular=0, absorption=(1,) * 3)
+    body = Object("body", shape("cube"), "dark", scale=(2, 2, 2))
+    # Paths end on it, inside of the body, whose boundary they need not meet.
+    wall = Object("wall", shape("plane"), "wall", (0, 0, -0.5), (90, 0, 0), (1.5, 1, 1.5))
+    materials = {"dark": clear, "wall": Material((0, 0, 0), specular=0, emission=(1, 1, 1))}
+    settings = RenderSettings(size=(16, 16), tile_size=8)
+    scene = Scene(Camera((0, 0, 3), (0, 0, 0), fov_y=10, near=near), Environment((1, 1, 1)), materials,
+                  (body, wall), settings)  # fmt: skip
+    check(traced_pairs(device(), scene, scene.with_material("dark", absorption=(0.5, 2, 0)), in_blocks))
 
 
 def test_near_cuts_off_what_is_nearer() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy.typing as npt
 import pytest
 from support.kernels import device
 from support.pairs import check, session_of, traced_pairs
-from support.reference_scenes import cornell
+from support.reference_scenes import cornell, environment, frosted
 from support.renders import render
 from support.small_scenes import mixed_scene
 
@@ -45,10 +46,16 @@ def test_each_addition_is_held_below_the_limit() -> None:
     assert np.isclose(added.mean(axis=-1), LIMIT, rtol=1e-4).mean() > 0.05
 
 
-def test_direct_light_stays() -> None:
-    direct = box(64, max_bounces=0)
-    np.testing.assert_allclose(box(64, max_bounces=0, clamp_indirect=1e-6), direct, rtol=1e-4, atol=1e-6)
-    np.testing.assert_allclose(box(64, clamp_indirect=1e-6), direct, rtol=1e-3, atol=1e-4)
+@pytest.mark.parametrize("make", [cornell, frosted, environment], ids=lambda make: make.__name__)
+def test_direct_light_stays_and_nothing_else(make: Callable[[], Scene]) -> None:
+    """Of opaque surfaces, rough glass and an image of the environment, which stages of their own bring."""
+    common: dict[str, Any] = {"seed": 3, "roulette_depth": 255}
+    direct = render(make(), 64, max_bounces=0, **common)
+    without = render(make(), 64, max_bounces=0, clamp_indirect=1e-6, **common)
+    np.testing.assert_allclose(without, direct, rtol=1e-4, atol=1e-6)
+    clamped = render(make(), 64, max_bounces=3, clamp_indirect=1e-6, **common)
+    np.testing.assert_allclose(clamped, direct, rtol=1e-3, atol=1e-4)
+    assert render(make(), 64, max_bounces=3, **common).mean() > 1.02 * direct.mean()
 
 
 def test_a_limit_that_nothing_reaches_changes_nothing() -> None:
