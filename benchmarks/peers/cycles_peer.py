@@ -28,6 +28,7 @@ from incpt.scene.material import Material
 
 _OVERHEAD_SPP = 2
 _ATTEMPTS = 3
+_SENSOR_MM = 36.0
 _MOST_BOUNCES = 1024
 
 
@@ -65,7 +66,9 @@ class CyclesPeer:
             placed = bpy.data.objects.new(obj.name, mesh)
             placed.matrix_world = _columns(obj.world_from_object)
             scene.collection.objects.link(placed)
-        self._place_camera(scene, job.scene.camera)
+        self._place_camera(scene, job.scene.camera, job.size[0] / job.size[1])
+        if job.scene.environment.picture is not None:
+            raise ValueError("only constant environments are compared with Cycles")
         self._set_sky(scene, job.scene.environment.radiance)
 
     def time(self, spp: int, seed: int) -> float:
@@ -134,15 +137,27 @@ class CyclesPeer:
         links.new(_shader(nodes, links, made, material).outputs[0], output.inputs["Surface"])
         return made
 
-    def _place_camera(self, scene: Any, camera: Camera) -> None:
+    def _place_camera(self, scene: Any, camera: Camera, aspect: float) -> None:
         from mathutils import Matrix
 
-        if camera != Camera(camera.position, camera.target, camera.up, camera.fov_y):
-            raise ValueError(f"{camera}: only plain pinholes are compared with Cycles")
         lens = self._bpy.data.cameras.new("camera")
-        lens.sensor_fit = "VERTICAL"
-        lens.angle = math.radians(camera.fov_y)
-        lens.clip_start, lens.clip_end = 1e-3, 1e6
+        larger = max(aspect, 1.0)
+        lens.sensor_fit, lens.sensor_width = "AUTO", _SENSOR_MM
+        if camera.is_orthographic:
+            length_m = 1.0
+            lens.type, lens.ortho_scale = "ORTHO", camera.ortho_height * larger
+        else:
+            half = math.tan(math.radians(camera.fov_y_at(aspect)) / 2)
+            lens.lens = _SENSOR_MM / larger / (2 * half)
+            length_m = lens.lens * 1e-3
+        lens.shift_x, lens.shift_y = camera.shift_x, camera.shift_y
+        lens.clip_start, lens.clip_end = max(camera.near, 1e-3), 1e6
+        if camera.has_lens:
+            lens.dof.use_dof = True
+            lens.dof.aperture_fstop = length_m / (2 * camera.lens_radius(aspect))
+            lens.dof.focus_distance = camera.sharp_distance
+            lens.dof.aperture_blades = camera.blades
+            lens.dof.aperture_rotation = math.radians(camera.blade_rotation)
         placed = self._bpy.data.objects.new("camera", lens)
         back = np.subtract(camera.position, camera.target)
         back = back / np.linalg.norm(back)
