@@ -7,7 +7,8 @@ cumulative = true           # each edit on top of the one before; false: each on
 [[edits]]
 name = "rotate red cube"    # optional label
 step = 0                    # rendering step, after the base picture, at which the edit happens
-object = "red cube"         # or material = "red", light = "lamp", camera = true (the active one), camera = "top",
+object = "red cube"         # or material = "red", light = "lamp", camera = true (the active one), camera =
+"top",
                             # environment = true
 rotation = [0, 30, 35]      # the new values, with the keys of the scene file
 pixel = [480, 270]          # optional: the point of change, for point_of_change = "pixel"

@@ -14,6 +14,7 @@ import numpy as np
 from incpt.core import files
 from incpt.core.checks import path_of, require
 from incpt.core.errors import InputError, InputWarning, one_line
+from incpt.core.layout import TextureSlot
 from incpt.formats import bitmaps, images, mesh_files, mesh_store
 from incpt.formats.scene_toml import VERSION
 from incpt.formats.textures import texture_value
@@ -21,6 +22,7 @@ from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
 from incpt.scene.image import Image
 from incpt.scene.light import STRENGTHS, Light
+from incpt.scene.material import Material, texture_name, texture_of
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import CAMERA_NAME, Object, Scene
 from incpt.scene.shapes import shape
@@ -160,12 +162,16 @@ def _document(scene: Scene, beside: _Beside) -> str:
     document["version"] = VERSION
     document.update(_camera_tables(scene))
     document["environment"] = _environment_table(scene.environment, beside)
-    render = _changed(scene.settings, beside)
+    render = _changed(scene.settings)
     if render:
         document["render"] = render
     if scene.materials:
         document["materials"] = {
-            name: {"base_color": _toml(material.base_color), **_changed(material, beside)}
+            name: {
+                "base_color": _toml(material.base_color),
+                **_changed(material),
+                **_textures(material, beside),
+            }
             for name, material in scene.materials.items()
         }
     if scene.objects:
@@ -231,17 +237,28 @@ def _placement(transform: Transform) -> dict[str, Any]:
     return {name: _toml(getattr(transform, name)) for name in names}
 
 
-def _changed(owner: Any, beside: _Beside) -> dict[str, Any]:
-    """The fields of a dataclass that differ from their defaults, as TOML has them."""
+def _material_table(material: Material, beside: _Beside) -> dict[str, Any]:
+    color = _toml(material.base_color)
+    return {"base_color": color, **_changed(material), **_textures(material, beside)}
+
+
+def _textures(material: Material, beside: _Beside) -> dict[str, Any]:
+    found = {texture_name(slot): texture_of(material, slot) for slot in TextureSlot}
+    return {
+        name: _toml(texture_value(texture, beside.bitmap))
+        for name, texture in found.items()
+        if texture is not None
+    }
+
+
+def _changed(owner: Any) -> dict[str, Any]:
+    """The fields of a dataclass that differ from their defaults, as TOML has them, but for textures."""
     changed = {
         field.name: getattr(owner, field.name)
         for field in fields(owner)
         if field.default is MISSING or getattr(owner, field.name) != field.default
     }
-    return {
-        name: _toml(texture_value(value, beside.bitmap) if isinstance(value, Texture) else value)
-        for name, value in changed.items()
-    }
+    return {name: _toml(value) for name, value in changed.items() if not isinstance(value, Texture)}
 
 
 def _toml(value: Any) -> Any:

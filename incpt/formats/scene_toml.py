@@ -29,7 +29,17 @@ _T = TypeVar("_T")
 VERSION = 2
 """That is written."""
 _READ = (1, 2)
-_TABLES = ("version", "camera", "cameras", "active_camera", "environment", "render", "materials", "objects", "lights")
+_TABLES = (
+    "version",
+    "camera",
+    "cameras",
+    "active_camera",
+    "environment",
+    "render",
+    "materials",
+    "objects",
+    "lights",
+)
 CAMERA_KEYS = tuple(field.name for field in fields(Camera))
 SKY_KEYS = tuple(field.name for field in fields(Sky))
 ENVIRONMENT_KEYS = tuple(field.name for field in fields(Environment))

@@ -65,6 +65,7 @@ def has_same_emitters(old: Scene, new: Scene) -> bool:
                     material.emission,
                     material.double_sided,
                     material.emission_texture,
+                    material.is_cutout,
                 )
             )
         return found
@@ -370,7 +371,8 @@ def _row(
     for i, scene in enumerate((old, new)):
         if scene is not None:
             material = scene.materials[name]
-            emission[i], double_sided[i] = material.emission, material.double_sided
+            emission[i] = (0, 0, 0) if material.is_cutout else material.emission
+            double_sided[i] = material.double_sided
             texture[i] = texture_numbers[i](material)
     has_other = (
         old is not None

@@ -53,7 +53,8 @@ def material_tables(
     for row, layer, (name, material) in zip(rows, layers, materials.items(), strict=False):
         for field in _COPIED:
             row[field] = getattr(material, field)
-        row["light_pdf"] = densities.get(name, 0.0)
+        # What covers in part is left to the rays that meet it, also where it is a lamp in the other scene.
+        row["light_pdf"] = 0.0 if material.is_cutout else densities.get(name, 0.0)
         row["flags"] = (
             flags.DOUBLE_SIDED * material.double_sided
             | flags.TRANSMISSIVE * (material.transmission > 0)

@@ -23,11 +23,12 @@ from incpt.scene.enclosing import transparent_bodies_around
 from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Scene
+from incpt.tables.alias import luminance
 from incpt.tables.attributes import AttributeTable, attribute_table
 from incpt.tables.environment import EnvironmentTables, environment_tables
 from incpt.tables.geometry_pool import GeometryPool, PooledMesh
 from incpt.tables.light_pairs import has_same_emitters, paired_light_tables
-from incpt.tables.lights import LightTables, light_tables, luminance
+from incpt.tables.lights import LightTables, light_tables
 from incpt.tables.materials import MaterialTables, material_tables
 from incpt.tables.object_table import NO_OBJECTS, PlacedObjects
 from incpt.tables.textures import TextureTables, texture_tables

@@ -216,6 +216,8 @@ EDITS: dict[str, Callable[[Scene], Scene]] = {
     "other cloth": lambda s: s.with_object("curtain", material="gauze"),
     "cloth to wood": lambda s: s.with_object("curtain", material="grey"),
     "pattern": lambda s: s.with_material("curtain", base_color_texture=holes()),
+    "lamp of gauze": lambda s: s.with_material("lamp", alpha=0.5, alpha_mode="blend"),
+    "gauze of light": lambda s: s.with_material("gauze", emission=(1, 2, 3)),
     "wood to cloth": lambda s: s.with_object("grey drum", material="curtain"),
 }
 

@@ -54,7 +54,7 @@ def windows(grid: TileGrid, camera: Camera, objects: tuple[Placed, ...]) -> list
     return found
 
 
-def most_blur(grid: TileGrid, camera: Camera, objects: tuple[Object, ...]) -> int:
+def most_blur(grid: TileGrid, camera: Camera, objects: tuple[Placed, ...]) -> int:
     """How many pixels beside its place something of these objects may be seen through a lens, at most an
     eighth of the picture's height."""
     size = np.array([grid.width, grid.height])
