@@ -102,9 +102,13 @@ def diff(old: Scene, new: Scene) -> Change:
 
 def _changed_lights(old: Scene, new: Scene) -> list[Light]:
     """Those that differ, as they were and as they are."""
-    if old.lights is new.lights or old.lights == new.lights:
+    if old.lights is new.lights:
         return []
-    before, after = ({light.name: _as_it_shines(light) for light in scene.lights} for scene in (old, new))
+    shared = set(map(id, old.lights)) & set(map(id, new.lights))
+    before, after = (
+        {light.name: _as_it_shines(light) for light in scene.lights if id(light) not in shared}
+        for scene in (old, new)
+    )
     return [
         light
         for own, other in ((before, after), (after, before))

@@ -6,6 +6,7 @@ makes `diff` cheap, undo is a list of scenes, and nobody has to set a flag that 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -157,9 +158,8 @@ class Scene:
             names, used = set(), set()
         if len(names) < len(objects) or not used <= materials.keys():
             self._complain_of_objects()
-        for light in self.lights:
-            if light.name in names:
-                raise InputError(f"lights: {light.name!r} is the name of an object too; rename one of them")
+        for name in names.intersection(map(_NAME, self.lights)):
+            raise InputError(f"lights: {name!r} is the name of an object too; rename one of them")
 
     def _checked_lights(self) -> tuple[Light, ...]:
         """`lights` as a tuple. Raises InputError."""
@@ -168,11 +168,9 @@ class Scene:
         except TypeError:
             raise InputError(f"lights: {described(self.lights)} is not a list of Lights") from None
         _require_all("lights", lights, Light, "a Light")
-        seen: set[str] = set()
-        for light in lights:
-            if light.name in seen:
-                raise InputError(f"lights: two are named {light.name!r}; rename one of them")
-            seen.add(light.name)
+        if len(set(map(_NAME, lights))) < len(lights):
+            name = next(name for name, count in Counter(map(_NAME, lights)).items() if count > 1)
+            raise InputError(f"lights: two are named {name!r}; rename one of them")
         return lights
 
     def _complain_of_objects(self) -> None:
