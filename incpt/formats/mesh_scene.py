@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import importlib.resources
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from incpt.core.errors import in_place
-from incpt.formats import images, mesh_files
+from incpt.formats import gltf_lights, images, mesh_files
 from incpt.scene.camera import Camera
+from incpt.scene.edits import unique_name
 from incpt.scene.environment import Environment
 from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
 
 
 def scene_around(path: Path) -> Scene:
-    """The meshes of a file with their materials (grey where it has none), framed by the camera."""
+    """The meshes of a file with their materials (grey where it has none), framed by the camera, and its
+    lights."""
     parts = mesh_files.load_parts(path)
     with in_place(str(path)):
         materials: dict[str, Material] = {}
@@ -30,7 +33,11 @@ def scene_around(path: Path) -> Scene:
             objects.append(Object(name, part.mesh, material_name))
         bounds = np.stack([o.world_bounds for o in objects])
         camera = _framing_camera(bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0))
-        return Scene(camera, _pleasant_environment(), materials, tuple(objects))
+        scene = Scene(camera, _pleasant_environment(), materials, tuple(objects))
+        for light in gltf_lights.lights_of(path):
+            name = unique_name(f"{path.stem}/{light.name}", scene.names)
+            scene = scene.with_added_light(replace(light, name=name))
+        return scene
 
 
 def _framing_camera(low: np.ndarray[Any, Any], high: np.ndarray[Any, Any]) -> Camera:
