@@ -1,7 +1,8 @@
 """What the rays through pixel centres meet first: as images, and for picking.
 
-These rays are not jittered, so that a pixel has one object and an outline does not flicker. Base colours and
-normals of the jittered samples of the picture itself are passes of the film; see `film`.
+These rays are not jittered, and go through the middle of a lens, so that a pixel has one object and an
+outline does not flicker. Base colours and normals of the jittered samples of the picture itself are passes of
+the film; see `film`.
 """
 
 from __future__ import annotations

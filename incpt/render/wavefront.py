@@ -41,15 +41,15 @@ _PLANES = {
 _CLASSES = {path_list: PathClass[path_list.name] for path_list in PathList}
 """Which paths are in which list."""
 _SHAPED, _CLAMP = "SHAPED_LIGHTS", "CLAMP_INDIRECT"
-_LIGHTS = ("ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS", _SHAPED)
+_LIGHTS = ("ENVIRONMENT_IMAGE", "SUN", "TRIANGLE_LIGHTS", _SHAPED)
 _TEXTURES = ("TEXTURES", "VERTEX_COLORS")
 _TRACED = (*_TEXTURES, "CUTOUTS")
 """Of first hits, which pass through lights."""
 _FEATURES: Mapping[str | None, tuple[str, ...]] = {
     "generate": ("LENS",),
     "intersect": (*_TRACED, _SHAPED, "MEDIA", _CLAMP),
-    "shade_miss": (*_LIGHTS, "SUN", "MEDIA", _CLAMP),
-    "sample_lights": (*_LIGHTS, "SUN", *_TEXTURES),
+    "shade_miss": (*_LIGHTS, "MEDIA", _CLAMP),
+    "sample_lights": (*_LIGHTS, *_TEXTURES),
     "touch_lights": (*_LIGHTS, *_TEXTURES),
     "shade_medium": (*_LIGHTS, *_TEXTURES, _CLAMP),
     "shade": (*_LIGHTS, *_TEXTURES, _CLAMP),

@@ -50,6 +50,7 @@ def spread(image: Array) -> tuple[Array, float]:
     return middle, float((weights * ((x - middle[0]) ** 2 + (y - middle[1]) ** 2)).sum())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blades", [0, 3, 6])
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
 @pytest.mark.parametrize("depth", [1.5, 6.0])
@@ -131,6 +132,7 @@ def test_what_is_picked_is_where_it_is_seen(kind: str, in_blocks: bool) -> None:
     np.testing.assert_allclose(part.depth, hits.depth[7:19], rtol=1e-5)
 
 
+@pytest.mark.slow
 @kinds
 def test_a_change_is_seen_within_the_windows_of_its_object(kind: str) -> None:
     """Base colours of what samples meet first change with the cube nowhere else, and the windows are no
@@ -168,6 +170,7 @@ def test_blocks_and_wavefront_agree(kind: str) -> None:
     assert images[0].mean() == pytest.approx(images[1].mean(), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_an_edit_behind_a_lens_converges_to_a_fresh_render() -> None:
     """What was moved is far out of focus, so that no pixel shows it alone."""
     scene = mixed_scene(strategy="impact", size=(40, 28), base_nor=16).with_camera(

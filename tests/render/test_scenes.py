@@ -21,7 +21,7 @@ from incpt.scene.model import Scene
 from incpt.scenes import make_city
 
 FOLDER = Path(str(resources.files("incpt.scenes")))
-NAMES = ("editing", "nested_dielectrics", "cornell", "mis", "bunny", "city", "textured", "lamps")
+NAMES = ("editing", "nested_dielectrics", "cornell", "mis", "bunny", "city", "textured", "lamps", "cameras")
 FLOOR_TOLERANCE = 0.01
 """Metres that an object may stand above or in its floor."""
 

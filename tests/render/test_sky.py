@@ -53,6 +53,7 @@ def test_a_matte_floor_reflects_the_irradiance_of_the_sun(technique: str | None)
     np.testing.assert_allclose(image.mean(axis=(0, 1)), expected, rtol=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("technique", ["MIS_ONLY_LIGHT", "MIS_ONLY_BSDF"])
 def test_sun_and_sky_add_up(technique: str) -> None:
     sky = Sky(40, sun_size=20)

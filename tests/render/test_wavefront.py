@@ -117,8 +117,16 @@ def test_both_schedules_follow_the_table_of_stages(
 
 
 def test_kernels_get_the_features_that_they_ask_for() -> None:
-    scene_has = {"ENVIRONMENT_IMAGE", "TRIANGLE_LIGHTS", "SHAPED_LIGHTS", "MEDIA"}
-    for kernel in {stage.kernel for stage in STAGES} - {None}:
+    scene_has = {
+        "ENVIRONMENT_IMAGE",
+        "TRIANGLE_LIGHTS",
+        "SHAPED_LIGHTS",
+        "MEDIA",
+        "SUN",
+        "LENS",
+        "CLAMP_INDIRECT",
+    }
+    for kernel in {"generate", *(stage.kernel for stage in STAGES)} - {None}:
         text = program.source(program.files()[bindings.FILES.get(kernel, kernel)])
         asked = {name for name in scene_has if re.search(rf"(ifn?def |defined\(){name}\b", text)}
         has = set(wavefront._FEATURES.get(kernel, ()))

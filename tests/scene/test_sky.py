@@ -79,6 +79,7 @@ def test_skies_are_those_of_blender(
     assert LUMINANCE @ seen(sky, elevation, azimuth) == pytest.approx(LUMINANCE @ blender, rel=0.07)
 
 
+@pytest.mark.slow
 def test_integrals_have_converged(monkeypatch: pytest.MonkeyPatch) -> None:
     skies = [Sky(15), Sky(40, dust=4), Sky(3)]
     usual = [sky.image.pixels[: HEIGHT // 2].astype(float) for sky in skies]
