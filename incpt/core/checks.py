@@ -17,6 +17,8 @@ from incpt.core.errors import InputError, one_line
 
 LONGEST_VALUE = 60
 """Characters of a value that a message quotes."""
+MOST_CHOICES = 12
+"""That a message lists."""
 _PLAIN = (bool, int, float, complex, str, bytes, list, tuple, dict)
 
 
@@ -58,7 +60,9 @@ def require_call(name: str, value: object) -> None:
 def one_of(name: str, value: object, choices: Collection[str]) -> None:
     """Raises InputError for what is not among these texts."""
     if not isinstance(value, str) or value not in choices:
-        raise InputError(f"{name}: {described(value)} is not known; choose one of {', '.join(choices)}")
+        some = [*choices][:MOST_CHOICES]
+        listed = ", ".join(some) + (", …" if len(choices) > len(some) else "")
+        raise InputError(f"{name}: {described(value)} is not known; choose one of {listed}")
 
 
 def whole(name: str, value: Any, low: int, high: int | None = None) -> int:

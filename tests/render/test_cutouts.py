@@ -11,9 +11,10 @@ import numpy.typing as npt
 import pytest
 from support.kernels import device
 from support.pairs import check, traced_pairs
-from support.renders import assert_same_mean, device_with, render, repeat
+from support.renders import assert_same_mean, render, repeat
 from support.small_scenes import mixed_scene, small_settings
 
+from incpt.device.device import Device
 from incpt.render.blocks import traces_in_blocks
 from incpt.render.session import Session
 from incpt.render.wavefront import Wavefront
@@ -106,7 +107,7 @@ def test_light_and_bsdf_sampling_find_the_same_light() -> None:
     scene = under_a_screen(gauze(1, base_color_texture=holes()), environment=image)
     both = repeat(scene, 256, max_bounces=1)
     for feature in ("MIS_ONLY_LIGHT", "MIS_ONLY_BSDF"):
-        alone = repeat(scene, 512, max_bounces=1, on=device_with(feature))
+        alone = repeat(scene, 512, max_bounces=1, on=Device(features=(feature,)))
         assert_same_mean(both, alone, relative=0.02)
 
 

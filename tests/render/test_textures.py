@@ -12,12 +12,13 @@ import pytest
 from support.kernels import device
 from support.pairs import check, traced_pairs
 from support.parameters import TEXTURES
-from support.renders import assert_same_mean, device_with, render, repeat
+from support.renders import assert_same_mean, render, repeat
 from support.small_scenes import mixed_scene, small_settings
 
 from incpt.core.affine import Vector
 from incpt.core.layout import TextureSlot
 from incpt.picture.color import linear_from_srgb
+from incpt.device.device import Device
 from incpt.render.blocks import traces_in_blocks
 from incpt.render.session import Session
 from incpt.render.wavefront import Wavefront
@@ -314,7 +315,7 @@ def test_light_and_bsdf_sampling_find_the_same_light_of_a_texture(double_sided: 
     scene = sign(windows(), double_sided=double_sided)
     both = repeat(scene, 128, max_bounces=0)
     for feature in ("MIS_ONLY_LIGHT", "MIS_ONLY_BSDF"):
-        alone = repeat(scene, 512, max_bounces=0, on=device_with(feature))
+        alone = repeat(scene, 512, max_bounces=0, on=Device(features=(feature,)))
         assert_same_mean(both, alone, relative=0.02)
 
 

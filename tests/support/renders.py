@@ -31,16 +31,6 @@ def render(
     return session.image().astype(np.float64)
 
 
-def device_with(feature: str) -> Device:
-    """A device that builds every kernel with one more feature."""
-
-    class Own(Device):
-        def kernel(self, name: str, file: str | None = None, features: tuple[str, ...] = ()) -> Any:
-            return super().kernel(name, file, (*features, feature))
-
-    return Own()
-
-
 def repeat(scene: Scene, spp: int, count: int = 8, **arguments: Any) -> npt.NDArray[np.float64]:
     """(count, H, W, 3) independent renders."""
     return np.stack([render(scene, spp, seed=seed, **arguments) for seed in range(100, 100 + count)])
