@@ -8,9 +8,11 @@ from collections.abc import Collection
 
 import numpy as np
 
+from incpt.core.layout import TextureSlot
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
 from incpt.scene.light import KINDS
+from incpt.scene.material import texture_of
 from incpt.scene.model import Scene
 
 
@@ -42,6 +44,7 @@ def describe(scene: Scene) -> list[str]:
         f"objects: {len(scene.objects):,}" + (f" ({hidden:,} hidden)" if hidden else ""),
         f"meshes: {len(meshes):,} with {stored:,} triangles; {placed:,} triangles placed",
         f"materials: {len(scene.materials):,}",
+        f"textures: {_described_textures(scene)}",
         f"lights: {_described_lights(scene)}",
         f"emissive objects: {len(lights):,} with {sum(len(o.mesh.faces) for o in lights):,} triangles",
         f"environment: {_described_environment(scene.environment)}",
@@ -54,6 +57,18 @@ def describe(scene: Scene) -> list[str]:
     count = f" ({scene.camera_name}, the active one of {others + 1})" if others else ""
     lines.append(f"camera{count}: {_described_camera(scene.camera, scene.settings.size)}")
     return lines + [f"warning: {problem}" for problem in scene_problems(scene)]
+
+
+def _described_textures(scene: Scene) -> str:
+    found = {
+        texture.bitmap
+        for material in scene.materials.values()
+        for slot in TextureSlot
+        if (texture := texture_of(material, slot)) is not None
+    }
+    size = sum(bitmap.device_bytes for bitmap in found) / 2**20
+    images = f"{len(found):,} image{'s' if len(found) != 1 else ''}"
+    return f"{images}, {size:.1f} MiB on a device" if found else "none"
 
 
 def _described_lights(scene: Scene) -> str:

@@ -89,6 +89,11 @@ class Bitmap:
         return int(self.pixels.shape[0])
 
     @property
+    def device_bytes(self) -> int:
+        """What its pixels take on a device: whole numbers of 8 bits as they are, others as half floats."""
+        return int(self.pixels.size) * (1 if self.pixels.dtype == np.uint8 else 2)
+
+    @property
     def channels(self) -> int:
         """1 to 4."""
         return int(self.pixels.shape[2])

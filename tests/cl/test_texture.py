@@ -168,6 +168,19 @@ def test_far_places_and_single_pixels_stay_in_the_image() -> None:
             assert (found[:, :3] <= pixels.max(axis=0) + 1e-6).all()
 
 
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+def test_bitmaps_take_little_more_than_they_say(dtype: type) -> None:
+    """Each once, however many textures use it and whatever for."""
+    bitmap = image(dtype, 3, height=64, width=33)
+    texture = Texture(bitmap)
+    materials = {
+        "a": Material(base_color_texture=texture),
+        "b": Material(base_color_texture=Texture(bitmap, wrap="mirror"), emission_texture=texture),
+    }
+    # Beside it a white pixel, and up to two words at the end of each.
+    assert bitmap.device_bytes <= texture_tables(device(), materials).byte_count <= bitmap.device_bytes + 24
+
+
 def test_several_bitmaps_lie_side_by_side() -> None:
     """Of sizes that leave bytes over at their ends."""
     textures = [

@@ -322,6 +322,10 @@ def test_describe_counts(tmp_path: Path) -> None:
     assert "meshes: 1 with 12 triangles; 24 triangles placed" in lines
     assert "lights: 0" in lines and "emissive objects: 1 with 12 triangles" in lines
     assert "bounds: (-0.5, -0.5, -0.5) to (0.5, 1, 0.5) metres" in lines
+    assert "textures: none" in lines
+    wood = Texture(Bitmap(np.zeros((512, 1024, 3), np.uint8)))
+    with_textures = scene.with_material("red", base_color_texture=wood, emission_texture=wood)
+    assert "textures: 1 image, 1.5 MiB on a device" in summary.describe(with_textures)
     with_image = scene.with_environment(image=Image(np.ones((2, 4, 3), np.float32)))
     assert "environment: radiance (1, 1, 1) times made in Python, 4 x 2 pixels" in summary.describe(
         with_image
