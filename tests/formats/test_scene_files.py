@@ -564,8 +564,8 @@ def scenes(draw: st.DrawFn) -> Scene:
         materials,
         tuple(objects),
         settings,
-        draw(names),
-        {name: draw(lenses(position)) for name in draw(st.lists(names, max_size=2))},
+        camera_name=draw(names),
+        cameras={name: draw(lenses(position)) for name in draw(st.lists(names, max_size=2))},
     )
 
 

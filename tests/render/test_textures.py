@@ -17,8 +17,8 @@ from support.small_scenes import mixed_scene, small_settings
 
 from incpt.core.affine import Vector
 from incpt.core.layout import TextureSlot
-from incpt.picture.color import linear_from_srgb
 from incpt.device.device import Device
+from incpt.picture.color import linear_from_srgb
 from incpt.render.blocks import traces_in_blocks
 from incpt.render.session import Session
 from incpt.render.wavefront import Wavefront

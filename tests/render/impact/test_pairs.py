@@ -404,20 +404,21 @@ def small_scenes(draw: st.DrawFn) -> Scene:
     return replace(scene, materials=materials, objects=(*scene.objects, *bodies), settings=settings)
 
 
+def _copied(body: Object, number: int, place: Place) -> Object:
+    """Under another name, and neither of the same size nor at the same height as any: which of two faces in
+    one plane is met is a matter of rounding, which is another one in other tables."""
+    scale = tuple((1 - 0.013 * number) * side for side in body.scale)
+    position = (place[0], 1.21 + 0.0007 * number, place[2])
+    return replace(body, name=f"body {number}", position=position, scale=scale)
+
+
 BODY_EDITS: dict[str, Callable[[Scene, Object, int, float, Place], Scene]] = {
     "move": lambda s, body, n, x, p: s.with_object(body.name, position=(0.5 * p[0], 1 + 0.5 * x, 0.5 * p[2])),
     "turn": lambda s, body, n, x, p: s.with_object(body.name, rotation=(180 * p[0], 180 * p[1], 180 * p[2])),
     "hide": lambda s, body, n, x, p: s.with_object(body.name, visible=not body.visible),
     "remove": lambda s, body, n, x, p: s.without_object(body.name),
     "copy": lambda s, body, n, x, p: s.with_added(
-        # Neither of the same size nor at the same height: which of two faces in one plane is met is a
-        # matter of rounding, which is another one in other tables.
-        replace(
-            body,
-            name=f"body {len(s.objects)}",
-            position=(p[0], 1.21, p[2]),
-            scale=tuple((1 - 0.013 * len(s.objects)) * side for side in body.scale),
-        )
+        _copied(body, next(i for i in range(len(s.objects), 99) if f"body {i}" not in s.object_index), p)
     ),
     "assign": lambda s, body, n, x, p: s.with_object(body.name, material=("glass", "metal", "green")[n % 3]),
     "colour": lambda s, body, n, x, p: s.with_material(body.material, base_color=(x, 0.5, 1 - x)),
