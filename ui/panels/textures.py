@@ -44,7 +44,7 @@ def draw(material: Material, refusals: Refusals) -> tuple[Material, TextureReque
                 if widgets.button(f"Remove##{name}", enabled=texture is not None):
                     material = refusals.changed(material, **{name: None})
             if texture is not None:
-                widgets.value_row(f"   {label}", _described(texture), tip)
+                widgets.value_row("   File", _described(texture), tip)
             if slot is TextureSlot.NORMAL:
                 material = _draw_strength(material, refusals)
         return material, request

@@ -20,7 +20,6 @@ from incpt.scene.selection import Selection
 from incpt.scene.sky import Sky
 from incpt.ui.commands import files
 from incpt.ui.dialogs.path_dialog import PathDialog
-from incpt.ui.panels import textures
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
 from incpt.viewer.renderer import Pin, Restart
 
@@ -184,7 +183,7 @@ SECTIONS = {
 }
 SECTIONS |= {"Settings of the scene", "Display", "Measurements"}
 SHOWN_ONLY = {"Image", "Step time plot", "Device"}
-SHOWN_ONLY |= {f"   {label}" for label, _ in textures._LABELS.values()}
+SHOWN_ONLY |= {"   File"}
 NOT_AT_FIRST = {f"Remove##{name}" for name in TEXTURES if name != "normal_texture"}
 """Buttons that have nothing to do."""
 ELSEWHERE = {
