@@ -99,3 +99,9 @@ INLINE Texel sample_texture(const Shading *shading, uint number, const Uvs *uvs)
     Texel lower = texel_between(texel_at(shading, texture, x0, y1), texel_at(shading, texture, x1, y1), tx);
     return texel_between(upper, lower, ty);
 }
+
+// A texture of emission, which is not below 0: images of floats may hold anything.
+INLINE Vec3 emission_texel(const Shading *shading, uint number, const Uvs *uvs) {
+    Vec3 color = sample_texture(shading, number, uvs).color;
+    return vec3(MAX(color.x, 0.0f), MAX(color.y, 0.0f), MAX(color.z, 0.0f));
+}

@@ -27,13 +27,22 @@ INLINE SurfaceMaterial surface_material(const Shading *shading, const Surface *s
     m.metallic *= rough.z;
 #endif
 #if TEXTURED(EMISSION)
-    m.emission = mul(m.emission, sample_texture(shading, textures[SLOT_OF_EMISSION], &uvs).color);
+    m.emission = mul(m.emission, emission_texel(shading, textures[SLOT_OF_EMISSION], &uvs));
 #endif
 #if TEXTURED(TRANSMISSION)
     m.transmission *= sample_texture(shading, textures[SLOT_OF_TRANSMISSION], &uvs).color.x;
 #endif
 #if TEXTURED(SPECULAR)
     m.specular *= sample_texture(shading, textures[SLOT_OF_SPECULAR], &uvs).alpha;
+#endif
+#if TEXTURED(BASE_COLOR) || TEXTURED(METALLIC_ROUGHNESS) || TEXTURED(TRANSMISSION) || TEXTURED(SPECULAR)
+    // Images of floats may hold anything.
+    m.base_color = vec3(CLAMP(m.base_color.x, 0.0f, 1.0f), CLAMP(m.base_color.y, 0.0f, 1.0f),
+                        CLAMP(m.base_color.z, 0.0f, 1.0f));
+    m.roughness = CLAMP(m.roughness, 0.0f, 1.0f);
+    m.metallic = CLAMP(m.metallic, 0.0f, 1.0f);
+    m.transmission = CLAMP(m.transmission, 0.0f, 1.0f);
+    m.specular = CLAMP(m.specular, 0.0f, 1.0f);
 #endif
     return m;
 }

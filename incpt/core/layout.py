@@ -54,7 +54,7 @@ MOST_RAYS = 256
 MOST_RAYS_IN_MEDIA = 250
 """Rays after which no path goes on from a transparent body. Those left are for the opaque surfaces behind."""
 
-MOST_LAYERS = 64
+MOST_LAYERS = 256
 """Surfaces that cover in part which a ray goes through at most; the next one covers all."""
 
 MIN_ALPHA = 1e-3

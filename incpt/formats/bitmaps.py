@@ -10,6 +10,7 @@ import hashlib
 import os
 import tempfile
 import weakref
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ import numpy.typing as npt
 from incpt.core.checks import path_of, whole
 from incpt.core.errors import InputError, in_place, one_line
 from incpt.core.files import check_readable, write_atomically
+from incpt.formats.images import muted
 from incpt.scene.texture import BITMAP_MAX_SIZE, Bitmap, BitmapSource
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".tga", ".bmp", ".hdr", ".exr")
@@ -38,20 +40,35 @@ def load_bitmap(path: str | os.PathLike[str], index: int | None = None) -> Bitma
     """
     path = path_of("path", path)
     index = None if index is None else whole("index", index, 0, 65_535)
-    status = check_readable(path)
-    key = (os.path.realpath(path), status.st_mtime_ns, status.st_size, index)
+    check_readable(path)
+    with in_place(str(path)):
+        if index is None:
+            key = _key(path, None)
+            bitmap = _bitmaps.get(key)
+            if bitmap is None:
+                bitmap = _bitmaps[key] = Bitmap(_pixels(path), BitmapSource(os.path.abspath(path)))
+            return bitmap
+        # It reads images by this module.
+        from incpt.formats.gltf import embedded_image
+
+        number = index
+        return embedded(path, number, lambda: embedded_image(path, number))
+
+
+def embedded(path: Path, index: int, content: Callable[[], tuple[bytes, str]]) -> Bitmap:
+    """An image within a file, by number: the same Bitmap as long as that is in use and the file is unchanged.
+    `content` gives the bytes of the image, and the suffix of such files. Raises InputError."""
+    key = _key(path, index)
     bitmap = _bitmaps.get(key)
     if bitmap is None:
-        with in_place(str(path)):
-            if index is None:
-                pixels = _pixels(path)
-            else:
-                # It reads images by this module.
-                from incpt.formats.gltf import embedded_image
-
-                pixels = pixels_of(*embedded_image(path, index))
-            bitmap = _bitmaps[key] = Bitmap(pixels, BitmapSource(os.path.abspath(path), index))
+        bitmap = Bitmap(pixels_of(*content()), BitmapSource(os.path.abspath(path), index))
+        _bitmaps[key] = bitmap
     return bitmap
+
+
+def _key(path: Path, index: int | None) -> _FileKey:
+    status = os.stat(path)
+    return os.path.realpath(path), status.st_mtime_ns, status.st_size, index
 
 
 def pixels_of(content: bytes, suffix: str) -> npt.NDArray[Any]:
@@ -69,6 +86,8 @@ def _pixels(path: Path) -> npt.NDArray[Any]:
     config = oiio.ImageSpec()
     # As glTF has it: colours are not multiplied with alpha.
     config.attribute("oiio:UnassociatedAlpha", 1)
+    if path.suffix.lower() in (".glb", ".gltf"):
+        raise InputError("may hold several images; name one by its number: `image = 0`")
     file = oiio.ImageInput.open(str(path), config)
     if file is None:
         raise InputError(
@@ -84,7 +103,8 @@ def _pixels(path: Path) -> npt.NDArray[Any]:
             raise InputError("is a deep or a volume image, which is no texture; save a flat one")
         chosen = _channels(list(spec.channelnames))
         kind = _kind(spec, oiio)
-        pixels = file.read_image(0, 0, 0, spec.nchannels, kind)
+        with muted():
+            pixels = file.read_image(0, 0, 0, spec.nchannels, kind)
         if pixels is None:
             raise InputError(f"is damaged ({_reason(file.geterror())}); save it again")
     finally:
@@ -147,4 +167,4 @@ def digest(bitmap: Bitmap) -> str:
 
 
 def _reason(message: str) -> str:
-    return one_line(message)[:80].rstrip(".") or "unknown"
+    return one_line(message)[:80].strip(" .:") or "unknown"

@@ -6,17 +6,18 @@ from __future__ import annotations
 import importlib.util
 import json
 import urllib.parse
+import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core.errors import InputError, reason_of
+from incpt.core.errors import InputError, InputWarning, in_place, reason_of
 from incpt.core.files import check_readable, read_bytes
 from incpt.formats.gltf_data import GltfData
 from incpt.formats.vertex_attributes import VertexAttributes
-from incpt.scene.material import Material
+from incpt.scene.material import LARGEST_CUTOFF, LARGEST_SLOPE, Material
 from incpt.scene.texture import UV_SETS, Texture
 
 MAX_UNSTORED_ITEMS = 100_000_000
@@ -115,7 +116,9 @@ def gltf_materials(data: GltfData, geometries: list[str]) -> dict[str, tuple[str
             index = primitive["material"]
             if index not in made:
                 table = data.header["materials"][index]
-                made[index] = str(table.get("name") or f"material {index}"), _gltf_material(table, data)
+                label = str(table.get("name") or f"material {index}")
+                with in_place(f"material {label!r}"):
+                    made[index] = label, _gltf_material(table, data, label)
             result[name] = made[index]
         except InputError:
             raise
@@ -150,9 +153,9 @@ def _matched(data: GltfData, geometries: list[str]) -> dict[str, dict[str, Any]]
     return dict(zip(geometries, primitives, strict=True)) if len(primitives) == len(geometries) else {}
 
 
-def _gltf_material(table: dict[str, Any], data: GltfData) -> Material:
+def _gltf_material(table: dict[str, Any], data: GltfData, label: str) -> Material:
     """A glTF 2.0 material, and what its KHR extensions ior, specular, transmission, volume and
-    emissive_strength say."""
+    emissive_strength say. Textures whose references are damaged are left out, with an InputWarning."""
     surface = table.get("pbrMetallicRoughness", {})
     extensions = table.get("extensions", {})
 
@@ -160,7 +163,14 @@ def _gltf_material(table: dict[str, Any], data: GltfData) -> Material:
         return extensions.get(f"KHR_materials_{extension}", {}).get(key, default)
 
     def texture(of: dict[str, Any] | None) -> Texture | None:
-        return None if of is None else data.texture(of)
+        try:
+            return None if of is None else data.texture(of)
+        except InputError:
+            raise
+        except Exception as error:  # A reference may be missing, out of range, or of any type.
+            text = f"{data.path}: material {label!r}: left out a texture that cannot be found"
+            warnings.warn(f"{text} ({reason_of(error)})", InputWarning, stacklevel=2)
+            return None
 
     strength = factor("emissive_strength", "emissiveStrength", 1.0)
     distance = factor("volume", "attenuationDistance", np.inf)
@@ -178,8 +188,8 @@ def _gltf_material(table: dict[str, Any], data: GltfData) -> Material:
         double_sided=table.get("doubleSided", False),
         alpha=surface.get("baseColorFactor", [1.0, 1.0, 1.0, 1.0])[3],
         alpha_mode=str(table.get("alphaMode", "OPAQUE")).lower(),
-        alpha_cutoff=table.get("alphaCutoff", 0.5),
-        normal_scale=normal.get("scale", 1.0),
+        alpha_cutoff=min(table.get("alphaCutoff", 0.5), LARGEST_CUTOFF),
+        normal_scale=float(np.clip(normal.get("scale", 1.0), -LARGEST_SLOPE, LARGEST_SLOPE)),
         base_color_texture=texture(surface.get("baseColorTexture")),
         metallic_roughness_texture=texture(surface.get("metallicRoughnessTexture")),
         normal_texture=texture(table.get("normalTexture")),

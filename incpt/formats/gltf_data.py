@@ -15,7 +15,7 @@ import numpy.typing as npt
 from incpt.core.errors import InputError, in_place
 from incpt.core.files import read_bytes
 from incpt.formats import bitmaps
-from incpt.scene.texture import UV_SETS, Bitmap, BitmapSource, Texture
+from incpt.scene.texture import UV_SETS, Bitmap, Texture
 
 _COMPONENTS = {
     5120: np.int8,
@@ -63,10 +63,10 @@ class GltfData:
 
     def texture(self, table: dict[str, Any]) -> Texture:
         """The texture that a material names by a table with `index`. Raises InputError, KeyError and kin."""
-        entry = self.header["textures"][table["index"]]
+        entry = _at(self.header["textures"], table["index"])
         sources = [entry.get("extensions", {}).get("EXT_texture_webp", {}).get("source"), entry.get("source")]
         image = next(source for source in sources if source is not None)
-        sampler = self.header["samplers"][entry["sampler"]] if "sampler" in entry else {}
+        sampler = _at(self.header["samplers"], entry["sampler"]) if "sampler" in entry else {}
         transform = table.get("extensions", {}).get("KHR_texture_transform", {})
         uv_set = int(transform.get("texCoord", table.get("texCoord", 0)))
         along_u, along_v = (_WRAPS.get(sampler.get(key, 0), "repeat") for key in ("wrapS", "wrapT"))
@@ -88,14 +88,13 @@ class GltfData:
                 if file is not None:
                     bitmap = bitmaps.load_bitmap(file)
                 else:
-                    pixels = bitmaps.pixels_of(*self.image(number))
-                    bitmap = Bitmap(pixels, BitmapSource(str(self.path.absolute()), number))
+                    bitmap = bitmaps.embedded(self.path, number, lambda: self.image(number))
                 self._bitmaps[number] = bitmap
         return self._bitmaps[number]
 
     def image(self, number: int) -> tuple[bytes, str]:
         """The content of an image that the file holds, and the suffix of such files. Raises InputError."""
-        image = self.header["images"][number]
+        image = _at(self.header["images"], number)
         if "bufferView" in image:
             view = self.header["bufferViews"][image["bufferView"]]
             first = int(view.get("byteOffset", 0))
@@ -106,7 +105,7 @@ class GltfData:
 
     def _image_file(self, number: int) -> Path | None:
         """The file of an image that stands beside the glTF file."""
-        uri = self.header["images"][number].get("uri", "data:")
+        uri = _at(self.header["images"], number).get("uri", "data:")
         return None if uri.startswith("data:") else self.path.parent / urllib.parse.unquote(uri)
 
     def _buffer(self, number: int) -> bytes:
@@ -119,6 +118,13 @@ class GltfData:
             else:
                 self._buffers[number] = read_bytes(self.path.parent / urllib.parse.unquote(uri))
         return self._buffers[number]
+
+
+def _at(values: list[dict[str, Any]], index: Any) -> dict[str, Any]:
+    """Raises IndexError also for what is no place in a list to a file, but one to Python."""
+    if isinstance(index, bool) or not isinstance(index, int) or index < 0:
+        raise IndexError(f"{index!r} is no index")
+    return values[index]
 
 
 def _binary_chunk(content: bytes) -> bytes:

@@ -79,7 +79,7 @@ def write_exr(path: str | os.PathLike[str], layers: Mapping[str, npt.ArrayLike])
 
     def write(temporary: Path) -> None:
         try:
-            with _quiet():
+            with muted():
                 OpenEXR.File(header, channels).write(str(temporary))
         except RuntimeError as error:
             raise OSError(one_line(error).replace(str(temporary), path.name)) from None
@@ -134,7 +134,7 @@ def _pixels(path: Path) -> Float32Image:
     import OpenEXR
 
     try:
-        with _quiet():
+        with muted():
             header = OpenEXR.File(str(path), header_only=True).header()
             _check_size(header)
             pixels = {
@@ -177,7 +177,7 @@ def _colour_names(names: set[str]) -> Iterator[tuple[str, str, str]]:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def muted() -> Iterator[None]:
     """Mutes the process's stdout and stderr: OpenEXR prints each error there before it raises it, and some
     on Python's stdout, which would keep it and print it later."""
     import OpenEXR

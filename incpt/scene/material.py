@@ -13,6 +13,10 @@ from incpt.scene.texture import Texture
 
 ALPHA_MODES = ("opaque", "mask", "blend")
 """What alpha says, as in glTF."""
+LARGEST_CUTOFF = 1000.0
+"""Of `alpha_cutoff`. Above 1 nothing is covered."""
+LARGEST_SLOPE = 100.0
+"""Of `normal_scale`; below 0 bumps are dents."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +30,7 @@ class Material:
     `alpha`, times that of `base_color_texture` and of colours at corners, is the share of what is behind a
     surface that it covers where `alpha_mode` is "blend"; "mask" covers all where it is at least
     `alpha_cutoff` and nothing elsewhere; "opaque" takes no notice of it. What covers in part is no light for
-    light sampling.
+    light sampling. A ray goes through 256 such surfaces at most (`layout.MOST_LAYERS`); the next covers all.
 
     Numbers are multiplied with what their textures say at a point: `base_color_texture` and
     `emission_texture` by colours in sRGB (where their bitmaps are bytes or 16-bit numbers),
@@ -65,10 +69,10 @@ class Material:
         set_vector(self, "emission", low=0.0)
         object.__setattr__(self, "priority", whole("priority", self.priority, 0, 1000))
         require_bool("double_sided", self.double_sided)
-        for name in ("alpha", "alpha_cutoff"):
-            set_number(self, name, 0.0, 1.0)
+        set_number(self, "alpha", 0.0, 1.0)
+        set_number(self, "alpha_cutoff", 0.0, LARGEST_CUTOFF)
         one_of("alpha_mode", self.alpha_mode, ALPHA_MODES)
-        set_number(self, "normal_scale", 0.0, 100.0)
+        set_number(self, "normal_scale", -LARGEST_SLOPE, LARGEST_SLOPE)
         for slot in TextureSlot:
             name = texture_name(slot)
             require(name, getattr(self, name), (Texture, NoneType), "a Texture")

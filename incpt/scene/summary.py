@@ -13,7 +13,7 @@ from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
 from incpt.scene.light import KINDS
 from incpt.scene.material import texture_of
-from incpt.scene.model import Scene
+from incpt.scene.model import Object, Scene
 
 
 def scene_problems(scene: Scene) -> list[str]:
@@ -30,7 +30,20 @@ def scene_problems(scene: Scene) -> list[str]:
             "the scene has no light: the picture will be black; "
             "add a light, an environment or an emissive material"
         )
+    bare = [obj.name for obj in scene.objects if obj.visible and _lacks_uvs(scene, obj)]
+    if bare:
+        others = f" and {len(bare) - 1:,} more" if len(bare) > 1 else ""
+        problems.append(
+            f"object {bare[0]!r}{others}: has textures, but no texture coordinates of their set; "
+            "one pixel of each image covers all, unwrap the mesh"
+        )
     return problems
+
+
+def _lacks_uvs(scene: Scene, obj: Object) -> bool:
+    material = scene.materials[obj.material]
+    textures = (texture_of(material, slot) for slot in TextureSlot)
+    return any(one is not None and one.uv_set >= len(obj.mesh.uvs) for one in textures)
 
 
 def describe(scene: Scene) -> list[str]:

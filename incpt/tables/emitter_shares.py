@@ -50,7 +50,7 @@ def corner_places(mesh: Mesh, texture: Texture | None) -> Array:
 
 
 def _face_shares(mesh: Mesh, texture: Texture, weights: Array) -> Array:
-    values = _colors_of(texture.bitmap) @ (weights / weights.sum()).astype(np.float32)
+    values = np.maximum(_colors_of(texture.bitmap), 0) @ (weights / weights.sum()).astype(np.float32)
     height, width = values.shape
     corners = corner_places(mesh, texture) @ texture.matrix[:, :2].T + texture.matrix[:, 2]
     edges = (corners[:, 1:] - corners[:, :1]) * [width, height]

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from incpt.core.errors import InputError
+from incpt.core.errors import InputError, InputWarning
 from incpt.formats import bitmaps, mesh_files, scene_save
 from incpt.formats.mesh_scene import scene_around
 from incpt.formats.registry import load
@@ -187,6 +187,37 @@ def test_placements_turn_tangents_too(tmp_path: Path) -> None:
         mesh = only_part(writer.write_gltf(tmp_path / f"{side}.gltf", attributes, {})).mesh
         assert mesh.tangents is not None
         np.testing.assert_allclose(mesh.tangents, np.broadcast_to([0, 1, 0, side], (2, 3, 4)), atol=1e-6)
+
+
+@pytest.mark.parametrize("index", [99, -1, "0", None])
+def test_a_texture_that_cannot_be_found_leaves_the_rest_of_its_material(
+    index: object, tmp_path: Path
+) -> None:
+    writer = Writer()
+    writer.more = {"images": [{"uri": "made.png"}], "textures": [{"source": 0}]}
+    material = {
+        "name": "leaf", "alphaMode": "MASK", "alphaCutoff": 1.5,
+        "normalTexture": {"index": index, "scale": -1},
+        "pbrMetallicRoughness": {"baseColorTexture": {"index": index}, "roughnessFactor": 0.25},
+    }  # fmt: skip
+    path = writer.write_gltf(tmp_path / "a.gltf", {"TEXCOORD_0": writer.accessor(UVS)}, material)
+    with pytest.warns(InputWarning, match=r"a.gltf: material 'leaf': left out a texture"):
+        made = only_part(path).material
+    assert made is not None and made.base_color_texture is None
+    assert (made.alpha_mode, made.alpha_cutoff, made.normal_scale, made.roughness) == ("mask", 1.5, -1, 0.25)
+
+
+def test_images_in_a_file_are_the_same_wherever_they_come_from(tmp_path: Path) -> None:
+    writer = Writer()
+    writer.view(png(tmp_path))
+    writer.more = {"images": [{"bufferView": 0, "mimeType": "image/png"}], "textures": [{"source": 0}]}
+    material = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
+    path = writer.write_glb(tmp_path / "a.glb", {"TEXCOORD_0": writer.accessor(UVS)}, material)
+    scene = scene_around(path)
+    scene_save.save(scene, tmp_path / "saved.toml")
+    assert load(tmp_path / "saved.toml") == scene
+    with pytest.raises(InputError, match="name one by its number"):
+        bitmaps.load_bitmap(path)
 
 
 def test_what_is_wrong_with_an_image_is_one_line(tmp_path: Path) -> None:

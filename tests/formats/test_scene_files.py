@@ -326,6 +326,9 @@ def test_describe_counts(tmp_path: Path) -> None:
     wood = Texture(Bitmap(np.zeros((512, 1024, 3), np.uint8)))
     with_textures = scene.with_material("red", base_color_texture=wood, emission_texture=wood)
     assert "textures: 1 image, 1.5 MiB on a device" in summary.describe(with_textures)
+    unwrapped = with_textures.with_material("red", base_color_texture=replace(wood, uv_set=1))
+    assert any("no texture coordinates" in line for line in summary.describe(unwrapped))
+    assert not any("no texture coordinates" in line for line in summary.describe(with_textures))
     with_image = scene.with_environment(image=Image(np.ones((2, 4, 3), np.float32)))
     assert "environment: radiance (1, 1, 1) times made in Python, 4 x 2 pixels" in summary.describe(
         with_image

@@ -65,6 +65,15 @@ def test_what_is_behind_is_seen_by_its_share(layers: int) -> None:
     np.testing.assert_allclose(image.mean(axis=(0, 1)), 0.4**layers * np.array([1, 2, 3]), rtol=0.01)
 
 
+def test_rays_go_through_many_layers() -> None:
+    mesh = shape("plane")
+    objects = tuple(Object(f"{i}", mesh, "m", (0, -0.01 * i, 0), scale=(9, 1, 9)) for i in range(100))
+    scene = Scene(
+        Camera((0, 2, 0.01), (0, 0, 0), fov_y=30), Environment((1, 1, 1)), {"m": gauze(0.0)}, objects
+    )
+    np.testing.assert_allclose(render(scene, 4, size=(16, 16), max_bounces=0), 1, atol=1e-6)
+
+
 def under_a_screen(
     screen: Material | None, mesh: Mesh | None = None, environment: Environment | None = None
 ) -> Scene:

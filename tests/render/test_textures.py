@@ -163,6 +163,21 @@ def test_albedo_of_textured_layers_is_that_of_plain_ones(name: str) -> None:
     np.testing.assert_allclose(render(scene, 256).mean(axis=(0, 1)), 1, atol=0.01)
 
 
+def test_images_of_floats_make_no_light_and_take_none() -> None:
+    """Values below 0 and above 1, in a furnace."""
+    wild = Texture(Bitmap(np.float32([[[-3, 7, 1e9]], [[2, -1, 0.5]]])), filter="nearest")
+    material = Material(
+        (1, 1, 1), metallic=1, base_color_texture=wild, metallic_roughness_texture=wild, emission=(1, 1, 1),
+        emission_texture=Texture(Bitmap(np.float32([[[-1, -1, -1]]]))),
+    )  # fmt: skip
+    scene = Scene(
+        Camera((1.1, 0.9, 1.4), (0, 0, 0), fov_y=36), Environment((1, 1, 1)), {"m": material},
+        (Object("o", shape("cube"), "m"),),
+    )  # fmt: skip
+    image = render(scene, 64)
+    assert image.min() >= 0 and image.max() < 1.2
+
+
 def full_of_textures() -> Scene:
     """Different textures in every slot, also of the second set of coordinates, and colours at corners."""
     scene = mixed_scene(max_bounces=3)
