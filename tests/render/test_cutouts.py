@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from support.kernels import device
+from support.law import assert_edits_converge
 from support.pairs import check, traced_pairs
 from support.renders import assert_same_mean, render, repeat
 from support.small_scenes import mixed_scene, small_settings
@@ -245,13 +246,7 @@ def test_a_path_that_met_nothing_that_changed_brings_the_same(name: str, in_bloc
 @pytest.mark.slow
 @pytest.mark.parametrize("strategy", ["spiral", "impact"])
 def test_after_edits_the_picture_is_that_of_a_fresh_start(strategy: str) -> None:
-    scene = replace(leaves(), settings=small_settings(strategy="restart"))
-    session = Session(scene, device=device(), settings=replace(scene.settings, strategy=strategy))
-    session.render(8)
-    for edit in EDITS.values():
-        scene = edit(scene)
-        session.edit(scene)
-        session.step()
-    session.restart()
-    session.render(16)
-    np.testing.assert_allclose(session.image(), pixels(scene, 16), rtol=1e-4, atol=1e-5)
+    scene = replace(leaves(), settings=small_settings())
+    # Light that rays alone find takes long to converge, and has its test among the pairs.
+    edits = [edit for name, edit in EDITS.items() if name not in ("lamp of gauze", "gauze of light")]
+    assert_edits_converge(device(), scene, edits, strategy)

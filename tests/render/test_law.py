@@ -14,6 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from support.law import assert_within_noise
 from support.small_scenes import mixed_scene, sky
 
 from incpt.device.device import Device
@@ -127,22 +128,6 @@ def apply_all(
             if counts_samples:
                 assert_counts_agree(session)
     return session, scene
-
-
-def assert_within_noise(device: Device, session: Session, scene: Scene, spp: int) -> None:
-    """The picture is that of fresh renders with other random numbers, within the noise of `spp` samples."""
-    pictures = []
-    for seed in range(4):
-        settings = replace(scene.settings, seed=10 + seed, base_nor=64, strategy="restart")
-        fresh = Session(replace(scene), size=session.size, settings=settings, device=device)
-        fresh.render(spp)
-        pictures.append(fresh.image())
-    mean, deviation = np.mean(pictures, axis=0), np.std(pictures, axis=0, ddof=1)
-    # Five pictures of equal noise; the deviation of four is pooled over the image.
-    noise = np.sqrt((deviation**2).mean() * (1 + 1 / 4)) + 1e-5
-    difference = session.image() - mean
-    assert np.sqrt((difference**2).mean()) < 1.3 * noise
-    assert abs(difference.mean()) < 5 * noise / np.sqrt(difference.size)
 
 
 @hypothesis_settings(

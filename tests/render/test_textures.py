@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from support.kernels import device
+from support.law import assert_edits_converge
 from support.pairs import check, traced_pairs
 from support.parameters import TEXTURES
 from support.renders import assert_same_mean, render, repeat
@@ -393,13 +394,5 @@ def test_a_path_that_met_nothing_that_changed_brings_the_same(name: str, in_bloc
 @pytest.mark.slow
 @pytest.mark.parametrize("strategy", ["spiral", "impact"])
 def test_after_edits_the_picture_is_that_of_a_fresh_start(strategy: str) -> None:
-    scene = replace(full_of_textures(), settings=small_settings(strategy="restart"))
-    session = Session(scene, device=device(), settings=replace(scene.settings, strategy=strategy))
-    session.render(8)
-    for edit in TEXTURE_EDITS.values():
-        scene = edit(scene)
-        session.edit(scene)
-        session.step()
-    session.restart()
-    session.render(16)
-    np.testing.assert_allclose(session.image(), pixels(scene, 16), rtol=1e-4, atol=1e-5)
+    scene = replace(full_of_textures(), settings=small_settings())
+    assert_edits_converge(device(), scene, TEXTURE_EDITS.values(), strategy)
