@@ -1,4 +1,5 @@
 #include "path/clamp.cl"
+#include "path/carried.cl"
 #include "path/state.cl"
 #ifdef SHAPED_LIGHTS
 #include "scene/shaped_light.cl"
@@ -13,11 +14,7 @@ INLINE void shade_light_path(const Params *params, const Shading *shading, const
                              const State *state, uint path, uint result, uint light_index, float distance) {
     Ray ray = load_ray(state->rays, STRIDE(state), path);
     Path p = load_path(state, path);
-    Vec3 throughput = p.throughput;
-#ifdef MEDIA
-    uint medium = load_medium_stack(state, path).entry[0];
-    throughput = mul(throughput, transmittance(shading->materials, medium, distance));
-#endif
+    Vec3 throughput = carried_along(shading, state, path, p.throughput, distance);
     ShapedLight light = load_shaped_light(params, emitters, light_index);
     Vec3 arriving = mul(throughput, shaped_radiance(&light, ray, distance, p.bsdf_pdf));
     accumulate(state, result, CLAMPED(params, arriving, finds_indirect(&p)));
@@ -28,11 +25,7 @@ INLINE void shade_sun_path(const Params *params, const Shading *shading, const E
                            const State *state, uint path, uint result, uint light_index) {
     Vec3 direction = load_ray(state->rays, STRIDE(state), path).direction;
     Path p = load_path(state, path);
-    Vec3 throughput = p.throughput;
-#ifdef MEDIA
-    uint medium = load_medium_stack(state, path).entry[0];
-    throughput = mul(throughput, transmittance(shading->materials, medium, INFINITY));
-#endif
+    Vec3 throughput = carried_along(shading, state, path, p.throughput, INFINITY);
     ShapedLight light = load_shaped_light(params, emitters, light_index);
     Vec3 radiance = sun_radiance(&light, direction, p.ray == 0u, p.bsdf_pdf);
     accumulate(state, result, CLAMPED(params, mul(throughput, radiance), finds_indirect(&p)));

@@ -1,3 +1,4 @@
+#include "path/carried.cl"
 #include "path/state.cl"
 #include "path/shade_light.cl"
 #include "scene/light.cl"
@@ -11,11 +12,7 @@ INLINE void shade_miss_path(const Params *params, const Shading *shading, const 
                             const State *state, uint path, uint result) {
     Vec3 direction = load_ray(state->rays, STRIDE(state), path).direction;
     Path p = load_path(state, path);
-    Vec3 throughput = p.throughput;
-#ifdef MEDIA
-    uint medium = load_medium_stack(state, path).entry[0];
-    throughput = mul(throughput, transmittance(shading->materials, medium, INFINITY));
-#endif
+    Vec3 throughput = carried_along(shading, state, path, p.throughput, INFINITY);
     float light_pdf;
     Vec3 arriving = eval_environment(params, emitters, direction, &light_pdf);
     float weight = bsdf_sampling_weight(p.bsdf_pdf, light_pdf);

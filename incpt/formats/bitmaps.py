@@ -43,11 +43,7 @@ def load_bitmap(path: str | os.PathLike[str], index: int | None = None) -> Bitma
     check_readable(path)
     with in_place(str(path)):
         if index is None:
-            key = _key(path, None)
-            bitmap = _bitmaps.get(key)
-            if bitmap is None:
-                bitmap = _bitmaps[key] = Bitmap(_pixels(path), BitmapSource(os.path.abspath(path)))
-            return bitmap
+            return _known_or(path, None, lambda: _pixels(path))
         # It reads images by this module.
         from incpt.formats.gltf import embedded_image
 
@@ -58,17 +54,16 @@ def load_bitmap(path: str | os.PathLike[str], index: int | None = None) -> Bitma
 def embedded(path: Path, index: int, content: Callable[[], tuple[bytes, str]]) -> Bitmap:
     """An image within a file, by number: the same Bitmap as long as that is in use and the file is unchanged.
     `content` gives the bytes of the image, and the suffix of such files. Raises InputError."""
-    key = _key(path, index)
+    return _known_or(path, index, lambda: pixels_of(*content()))
+
+
+def _known_or(path: Path, index: int | None, read: Callable[[], npt.NDArray[Any]]) -> Bitmap:
+    status = os.stat(path)
+    key = (os.path.realpath(path), status.st_mtime_ns, status.st_size, index)
     bitmap = _bitmaps.get(key)
     if bitmap is None:
-        bitmap = Bitmap(pixels_of(*content()), BitmapSource(os.path.abspath(path), index))
-        _bitmaps[key] = bitmap
+        bitmap = _bitmaps[key] = Bitmap(read(), BitmapSource(os.path.abspath(path), index))
     return bitmap
-
-
-def _key(path: Path, index: int | None) -> _FileKey:
-    status = os.stat(path)
-    return os.path.realpath(path), status.st_mtime_ns, status.st_size, index
 
 
 def pixels_of(content: bytes, suffix: str) -> npt.NDArray[Any]:

@@ -87,9 +87,12 @@ class Material:
         return any(c > 0 for c in self.emission)
 
 
+_TEXTURE_NAMES = {slot: f"{slot.name.lower()}_texture" for slot in TextureSlot}
+
+
 def texture_name(slot: TextureSlot) -> str:
     """The parameter of a material that holds the texture of a slot."""
-    return f"{slot.name.lower()}_texture"
+    return _TEXTURE_NAMES[slot]
 
 
 def texture_of(material: Material, slot: TextureSlot) -> Texture | None:

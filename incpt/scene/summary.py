@@ -12,8 +12,8 @@ from incpt.core.layout import TextureSlot
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
 from incpt.scene.light import KINDS
-from incpt.scene.material import texture_of
-from incpt.scene.model import Object, Scene
+from incpt.scene.material import Material, texture_of
+from incpt.scene.model import Scene
 
 
 def scene_problems(scene: Scene) -> list[str]:
@@ -30,7 +30,8 @@ def scene_problems(scene: Scene) -> list[str]:
             "the scene has no light: the picture will be black; "
             "add a light, an environment or an emissive material"
         )
-    bare = [obj.name for obj in scene.objects if obj.visible and _lacks_uvs(scene, obj)]
+    needed = {name: _needed_uv_sets(material) for name, material in scene.materials.items()}
+    bare = [o.name for o in scene.objects if o.visible and len(o.mesh.uvs) < needed[o.material]]
     if bare:
         others = f" and {len(bare) - 1:,} more" if len(bare) > 1 else ""
         problems.append(
@@ -40,10 +41,10 @@ def scene_problems(scene: Scene) -> list[str]:
     return problems
 
 
-def _lacks_uvs(scene: Scene, obj: Object) -> bool:
-    material = scene.materials[obj.material]
+def _needed_uv_sets(material: Material) -> int:
+    """How many sets of texture coordinates its textures ask a mesh for."""
     textures = (texture_of(material, slot) for slot in TextureSlot)
-    return any(one is not None and one.uv_set >= len(obj.mesh.uvs) for one in textures)
+    return max((one.uv_set + 1 for one in textures if one is not None), default=0)
 
 
 def describe(scene: Scene) -> list[str]:

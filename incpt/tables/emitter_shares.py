@@ -26,7 +26,9 @@ _LEAST_POINTS, _MOST_POINTS = 16, 4096
 _POINTS_AT_ONCE = 1 << 20
 
 _shares: WeakKeyDictionary[Mesh, dict[tuple[Texture, tuple[float, ...]], Array]] = WeakKeyDictionary()
-_colors: WeakKeyDictionary[Bitmap, npt.NDArray[np.float32]] = WeakKeyDictionary()
+_MOST_KNOWN = 4
+"""Shares that are remembered of a mesh: while an edit is compared, those of two scenes take turns."""
+_ROWS_AT_ONCE = 256
 
 
 def face_shares(mesh: Mesh, material: Material) -> Array:
@@ -37,7 +39,8 @@ def face_shares(mesh: Mesh, material: Material) -> Array:
     known = _shares.setdefault(mesh, {})
     key = texture, material.emission
     if key not in known:
-        known.clear()
+        if len(known) >= _MOST_KNOWN:
+            known.clear()
         known[key] = _face_shares(mesh, texture, np.asarray(material.emission) * _LUMINANCE)
     return known[key]
 
@@ -50,7 +53,7 @@ def corner_places(mesh: Mesh, texture: Texture | None) -> Array:
 
 
 def _face_shares(mesh: Mesh, texture: Texture, weights: Array) -> Array:
-    values = np.maximum(_colors_of(texture.bitmap), 0) @ (weights / weights.sum()).astype(np.float32)
+    values = _luminance(texture.bitmap, (weights / weights.sum()).astype(np.float32))
     height, width = values.shape
     corners = corner_places(mesh, texture) @ texture.matrix[:, :2].T + texture.matrix[:, 2]
     edges = (corners[:, 1:] - corners[:, :1]) * [width, height]
@@ -86,7 +89,10 @@ def _looked_up(values: npt.NDArray[np.float32], places: Array, wrap: tuple[str, 
     return np.asarray(values[indices[1], indices[0]], np.float64)
 
 
-def _colors_of(bitmap: Bitmap) -> npt.NDArray[np.float32]:
-    if bitmap not in _colors:
-        _colors[bitmap] = linear_colors(bitmap)
-    return _colors[bitmap]
+def _luminance(bitmap: Bitmap, weights: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """(H, W) the weighted sum of its linear colours, some rows at a time: a bitmap may be large."""
+    values = np.empty((bitmap.height, bitmap.width), np.float32)
+    for first in range(0, bitmap.height, _ROWS_AT_ONCE):
+        rows = slice(first, first + _ROWS_AT_ONCE)
+        values[rows] = np.maximum(linear_colors(Bitmap(bitmap.pixels[rows])), 0) @ weights
+    return values

@@ -186,6 +186,10 @@ def _shares(
     before, after = _seen(old, weights), _seen(new, weights)
     for key in [*before, *(key for key in after if key not in before)]:
         a, b = before.get(key), after.get(key)
+        if not any(
+            scene.materials[key[1]].emission_texture for scene in (old, new) if key[1] in scene.materials
+        ):
+            continue  # as nearly all: every share is 1
         own = {
             i: face_shares(obj.mesh, scene.materials[key[1]])
             for i, (obj, scene) in enumerate(((a, old), (b, new)))

@@ -178,8 +178,9 @@ def triangle_lights(
         corners[kept], emission[owner], density[owner] * share_of_face, power, sides[owner], errors[kept]
     )
     numbers = np.array([texture_number(material) for material in materials], np.uint32)
-    places = np.concatenate([texture_places(obj, materials[i]) for i, obj in enumerate(objects)])
-    set_textures(planes, numbers[owner], places[kept])
+    if numbers.any():
+        places = np.concatenate([texture_places(obj, materials[i]) for i, obj in enumerate(objects)])
+        set_textures(planes, numbers[owner], places[kept])
     lit = np.flatnonzero(np.bincount(owner)).tolist()
     return TriangleLights(
         planes,
