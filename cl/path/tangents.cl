@@ -64,7 +64,9 @@ INLINE float stretched_turns(const Shading *shading, __global const Material *ma
     sincos_turns(turns - FLOOR(turns), &sine, &cosine);
     Vec3 along = add(scale(cosine, tangents->tangent), scale(sine, tangents->up));
     Frame frame = frame_of(shading_normal);
-    return atan2_turns(dot(along, frame.bitangent), dot(along, frame.tangent));
+    float found = atan2_turns(dot(along, frame.bitangent), dot(along, frame.tangent));
+    // What is read in place of tangents that are not there may be anything.
+    return tangents->exists ? found : 0.0f;
 }
 #endif
 
@@ -79,15 +81,16 @@ INLINE void set_tangents(__global const Object *objects, const Shading *shading,
     Uvs uvs = {0.0f, 0.0f, 0.0f, 0.0f};
 #endif
     Vec3 smooth = surface->shading;
+    __global const uint *textures = material->textures;
 #if TEXTURED(NORMAL)
-    uint number = material->textures[SLOT_OF_NORMAL];
-    surface->shading = mapped_normal(shading, number, material->normal_scale, &uvs, &frame, smooth);
+    surface->shading =
+        mapped_normal(shading, textures[SLOT_OF_NORMAL], material->normal_scale, &uvs, &frame, smooth);
 #endif
 #ifdef COAT_NORMALS
     surface->coat = smooth;
 #if TEXTURED(CLEARCOAT_NORMAL)
-    number = material->textures[SLOT_OF_CLEARCOAT_NORMAL];
-    surface->coat = mapped_normal(shading, number, material->clearcoat_normal_scale, &uvs, &frame, smooth);
+    surface->coat = mapped_normal(shading, textures[SLOT_OF_CLEARCOAT_NORMAL],
+                                  material->clearcoat_normal_scale, &uvs, &frame, smooth);
 #endif
 #endif
 #if HAS_TRAIT(ANISOTROPY)
