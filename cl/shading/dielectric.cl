@@ -1,3 +1,4 @@
+#include "shading/fresnel.cl"
 #include "shading/material.cl"
 #include "shading/medium.cl"
 
@@ -30,16 +31,6 @@ typedef struct {
     float reflects;
     Vec3 reflected, passed;
 } Parting;
-
-// Unpolarised Fresnel reflectance; cosine > 0 on the side of incidence. 1 under total internal reflection.
-INLINE float fresnel_dielectric(float cosine, float eta) {
-    float sin2_t = (1.0f - cosine * cosine) / (eta * eta);
-    float cos_t = SQRT(MAX(1.0f - sin2_t, 0.0f));
-    float parallel = (eta * cosine - cos_t) / (eta * cosine + cos_t);
-    float perpendicular = (cosine - eta * cos_t) / (cosine + eta * cos_t);
-    float reflected = 0.5f * (parallel * parallel + perpendicular * perpendicular);
-    return sin2_t >= 1.0f ? 1.0f : reflected;
-}
 
 INLINE int is_thin(const Boundary *b) {
 #if HAS_TRAIT(THIN_WALLED)

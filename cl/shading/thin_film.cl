@@ -1,4 +1,4 @@
-#include "base/scalar.cl"
+#include "shading/fresnel.cl"
 
 // Colours of a thin film on a surface: L. Belcour and P. Barla, A Practical Extension to Microfacet Theory
 // for the Modeling of Varying Iridescence, SIGGRAPH 2017, as KHR_materials_iridescence uses it. Light that
@@ -32,25 +32,19 @@ INLINE Vec3 wave_color(float path, float turns) {
                 0.052887f * x - 0.204026f * y + 1.151139f * z);
 }
 
-INLINE float schlick(float f0, float cosine) {
-    float c = 1.0f - CLAMP(cosine, 0.0f, 1.0f);
-    return f0 + (1.0f - f0) * (c * c * c * c * c);
-}
-
 // One channel of the reflectance below the film, seen from inside of it, and whether it turns the phase over.
 INLINE float below_film(float f0, float ior, float cosine, float *turns) {
     float root = SQRT(MIN(f0, 0.9999f));
     float base_ior = (1.0f + root) / (1.0f - root);
-    float r = (base_ior - ior) / (base_ior + ior);
     *turns = base_ior < ior ? 0.5f : 0.0f;
-    return schlick(r * r, cosine);
+    return fresnel_dielectric(cosine, base_ior / ior);
 }
 
 // One channel: Airy's sum to its second term. `first` and `second` are the colours of waves with one and with
 // two ways to and fro.
 INLINE float airy_sum(float outer, float inner, float first, float second) {
     float through = 1.0f - outer;
-    float both = CLAMP(outer * inner, 1e-5f, 0.9999f);
+    float both = MIN(outer * inner, 0.9999f);
     float root = SQRT(both);
     float again = through * through * inner / (1.0f - both);
     float wave = again - through;
@@ -64,8 +58,7 @@ INLINE Vec3 film_reflectance(const ThinFilm *film, float cosine) {
     float ior = LERP(1.0f, film->ior, t * t * (3.0f - 2.0f * t));
     float c = CLAMP(cosine, 0.0f, 1.0f);
     float inside = SQRT(MAX(1.0f - (1.0f - c * c) / (ior * ior), 0.0f));
-    float r = (ior - 1.0f) / (ior + 1.0f);
-    float outer = schlick(r * r, c);
+    float outer = fresnel_dielectric(c, ior);
     float path = 2.0f * ior * film->thickness * inside;
     float turns_r, turns_g, turns_b;
     float inner_r = below_film(film->f0.x, ior, inside, &turns_r);

@@ -220,7 +220,8 @@ ALIKE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
                   {"clearcoat": 1, "clearcoat_roughness": 0.5, "clearcoat_texture": uniform(0.5, 0, 0),
                    "clearcoat_roughness_texture": uniform(0, 0.5, 0)}),
     "sheen": ({"sheen_color": (0.5, 0.25, 0.5), "sheen_roughness": 0.25},
-              {"sheen_color": (1, 1, 0.5), "sheen_roughness": 0.5, "sheen_color_texture": uniform(0.5, 0.25, 1),
+              {"sheen_color": (1, 1, 0.5), "sheen_roughness": 0.5,
+               "sheen_color_texture": uniform(0.5, 0.25, 1),
                "sheen_roughness_texture": uniform(0, 0, 0, 0.5)}),
     "anisotropy": ({"anisotropy": 0.5, "anisotropy_rotation": 120},
                    {"anisotropy": 1, "anisotropy_rotation": 30, "anisotropy_texture": uniform(0.5, 1, 0.5)}),
@@ -254,8 +255,8 @@ def test_a_texture_that_is_the_same_everywhere_is_a_number(name: str, in_blocks:
 
 @pytest.mark.parametrize("in_blocks", [True, False])
 def test_a_clearcoat_lies_smooth_on_bumps_unless_it_has_some(in_blocks: bool) -> None:
-    """Black metal that looks all to one side below a coat: the coat mirrors a lamp where a flat one does; with
-    the same map of its own it does so no more."""
+    """A black base that looks all to one side below a coat: the coat mirrors a lamp where a flat one does;
+    with the same map of its own it does so no more."""
     if in_blocks and not traces_in_blocks(device()):
         pytest.skip("no blocks on this device")
     leaning = np.float32([np.sin(0.4), 0, np.cos(0.4)]) / 2 + 0.5
