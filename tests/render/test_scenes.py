@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from incpt.core.layout import MaterialTrait
 from incpt.device.device import Device
 from incpt.formats.edit_script import load_edits
 from incpt.formats.registry import load
@@ -19,9 +20,13 @@ from incpt.scene.change import diff
 from incpt.scene.light import KINDS
 from incpt.scene.model import Scene
 from incpt.scenes import make_city
+from incpt.tables.materials import traits_of
 
 FOLDER = Path(str(resources.files("incpt.scenes")))
-NAMES = ("editing", "nested_dielectrics", "cornell", "mis", "bunny", "city", "textured", "lamps", "cameras")
+NAMES = (
+    "editing", "nested_dielectrics", "cornell", "mis", "bunny", "city", "textured", "lamps", "cameras",
+    "materials",
+)  # fmt: skip
 FLOOR_TOLERANCE = 0.01
 """Metres that an object may stand above or in its floor."""
 
@@ -166,6 +171,11 @@ def test_lights_of_mis_have_equal_power(scenes: dict[str, Scene]) -> None:
 
 def test_lamps_has_every_kind(scenes: dict[str, Scene]) -> None:
     assert {light.kind for light in scenes["lamps"].lights} == set(KINDS)
+
+
+def test_materials_has_every_trait(scenes: dict[str, Scene]) -> None:
+    shown = set().union(*map(traits_of, scenes["materials"].materials.values()))
+    assert shown == set(MaterialTrait) - {MaterialTrait.SPECULAR_COLOR, MaterialTrait.UNLIT}
 
 
 def test_city_is_large(scenes: dict[str, Scene]) -> None:

@@ -239,7 +239,8 @@ def brushed() -> Scene:
     along = Material((1, 1, 1), metallic=1, roughness=0.3, anisotropy=0.4)
     materials = {
         "floor": matte(0.4, 0.4, 0.4), "lamp": lamp(8, 7, 6), "along": along,
-        "across": replace(along, anisotropy_rotation=90), "much": replace(along, roughness=0.2, anisotropy=0.5),
+        "across": replace(along, anisotropy_rotation=90),
+        "much": replace(along, roughness=0.2, anisotropy=0.5),
     }  # fmt: skip
     objects = (
         plane("floor", "floor", (0, 0, 0), (0, 0, 0), (6, 1, 6)),
