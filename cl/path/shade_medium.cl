@@ -107,6 +107,9 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
     int smooth = 1;
 #ifndef SMOOTH_MEDIA
     // Without a step in IOR there is nothing to scatter at, however rough the boundary is.
+    boundary.gain =
+        LERP(1.0f, rough_gain(&boundary, material.roughness, wo.z, shading->glass, shading->albedos),
+             params->multiple_scattering);
     smooth = (material.roughness * material.roughness <= MIN_ALPHA) | (FABS(boundary.eta - 1.0f) < 1e-5f);
 #ifdef LIGHT_SAMPLING
     // Light sampling, where the boundary has a density for it.

@@ -14,6 +14,7 @@ typedef struct {
     float alpha;
     float specular;   // scales Fresnel reflection, total internal reflection apart (KHR_materials_specular)
     Vec3 transmitted; // tint of what goes through
+    float gain;       // of rough boundaries, see rough_gain
 #if HAS_TRAIT(THIN_WALLED)
     int thin;
 #endif
@@ -87,6 +88,42 @@ INLINE Vec3 refracted(Vec3 wo, Vec3 h, float eta) {
     return add(scale(-1.0f / eta, wo), scale(cosine / eta - cos_t, h));
 }
 
+#define GLASS_ROW (2u * GLASS_STEPS)
+
+// Between two cosines of the table of rough glass, for a boundary whose reflection is scaled.
+INLINE float glass_albedo(__global const float *row, float share, float specular) {
+    return LERP(LERP(row[0], row[1], specular), LERP(row[2], row[3], specular), share);
+}
+
+// What a rough boundary reflects or lets through is this many times what microfacets do at once, so that what
+// meets several of them is not lost: it takes the same ways as the rest (E. Turquin, Practical Multiple
+// Scattering Compensation for Microfacet Models, 2019). `glass` is the table of albedo.glass_table, `rows`
+// that of albedo.rows, which serves walls: the shares of both sides of one depend on masking alone.
+INLINE float rough_gain(const Boundary *b, float roughness, float cosine, __global const float *glass,
+                        __global const float *rows) {
+    float step = CLAMP((b->eta - 1.0f) / (b->eta + 1.0f) + 0.5f, 0.0f, 1.0f) * (float)(GLASS_STEPS - 1u);
+    float rough = CLAMP(roughness, 0.0f, 1.0f) * (float)(GLASS_STEPS - 1u);
+    float root = SQRT(CLAMP(cosine, 0.0f, 1.0f)) * (float)(GLASS_STEPS - 1u);
+    uint i = MIN((uint)step, GLASS_STEPS - 2u), j = MIN((uint)rough, GLASS_STEPS - 2u);
+    uint k = MIN((uint)root, GLASS_STEPS - 2u);
+    float s = step - (float)i, t = rough - (float)j, u = root - (float)k;
+    __global const float *first = glass + 2u * ((i * GLASS_STEPS + j) * GLASS_STEPS + k);
+    // Along the root of the cosine, then roughness, then the step.
+    float albedo =
+        LERP(LERP(glass_albedo(first, u, b->specular), glass_albedo(first + GLASS_ROW, u, b->specular), t),
+             LERP(glass_albedo(first + GLASS_STEPS * GLASS_ROW, u, b->specular),
+                  glass_albedo(first + (GLASS_STEPS + 1u) * GLASS_ROW, u, b->specular), t),
+             s);
+#if HAS_TRAIT(THIN_WALLED)
+    AlbedoRows row = rows_at(rows, roughness);
+    float place = CLAMP(cosine, 0.0f, 1.0f) * (float)(ALBEDO_TABLE_SIZE - 1u);
+    uint cell = MIN((uint)place, ALBEDO_TABLE_SIZE - 2u);
+    float wall = LERP(between_rows(row, cell), between_rows(row, cell + 1u), place - (float)cell);
+    albedo = is_thin(b) ? wall : albedo;
+#endif
+    return 1.0f / MAX(albedo, 0.1f);
+}
+
 // GGX with height-correlated Smith masking; the cosine of wi is in f_cos, pdf is per solid angle and that of
 // sample_rough_boundary. Radiance is scaled by 1 / eta^2 on its way through, as it travels against the path.
 INLINE BsdfValue eval_rough_boundary(const Boundary *b, Vec3 wo, Vec3 wi) {
@@ -124,7 +161,7 @@ INLINE BsdfValue eval_rough_boundary(const Boundary *b, Vec3 wo, Vec3 wi) {
 #endif
     BsdfValue result;
     result.f_cos = select(reflects, scale(reflected, parting.reflected), scale(passed, parting.passed));
-    result.f_cos = select(possible, result.f_cos, vec3(0.0f, 0.0f, 0.0f));
+    result.f_cos = select(possible, scale(b->gain, result.f_cos), vec3(0.0f, 0.0f, 0.0f));
     result.pdf = possible ? pdf : 0.0f;
     return result;
 }

@@ -73,7 +73,6 @@ typedef struct {
     __global const float *stretched; // Shading.stretched
 } AlbedoTables;
 
-#ifdef TEXTURED_LAYER
 // Two neighbouring rows of the table of albedos, and where a roughness lies between them.
 typedef struct {
     __global const float *first;
@@ -91,7 +90,6 @@ INLINE AlbedoRows rows_at(__global const float *albedos, float roughness) {
 INLINE float between_rows(AlbedoRows rows, uint place) {
     return LERP(rows.first[place], rows.first[ALBEDO_ROW_SIZE + place], rows.share);
 }
-#endif
 
 #if HAS_TRAIT(ANISOTROPY)
 // The same in the table of stretched reflections: four rows, for two roughnesses across and two steps.

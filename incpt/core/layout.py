@@ -77,6 +77,9 @@ STRETCHED_ROUGHNESSES, STRETCHED_STEPS, STRETCHED_COSINES = 16, 8, 16
 stretched, and in the root of the cosine."""
 STRETCHED_ROW_SIZE = 6 * STRETCHED_COSINES + 2
 """Floats of a roughness and a stretch in that table (see `albedo.stretched_rows`)."""
+GLASS_STEPS = 17
+"""Resolution of the albedo table of rough glass in the step of the index of refraction, in roughness and in
+the root of the cosine (see `albedo.glass_table`); in the middle there is no step."""
 CLEARCOAT_F0 = 0.04
 """Reflectance of a clearcoat at normal incidence: that of an index of refraction of 1.5."""
 MIN_SHEEN_ALPHA = 0.04
@@ -817,7 +820,7 @@ PARAMS = _packed(
         ("max_bounces", np.uint32),
         ("transmission_bounces", np.uint32),
         ("roulette_depth", np.uint32),
-        ("multiple_scattering", np.float32),  # 1, or 0: light that scatters again on rough metal is lost
+        ("multiple_scattering", np.float32),  # 1, or 0: light that meets several microfacets is lost
         ("clamp_indirect", np.float32),  # with CLAMP_INDIRECT: see cl/path/clamp.cl
         ("light_count", np.uint32),
         ("environment_probability", np.float32),  # of sampling the environment instead of a triangle

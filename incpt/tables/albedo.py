@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from incpt.core.layout import (
     ALBEDO_TABLE_SIZE,
+    GLASS_STEPS,
     LEAST_ALBEDO_LOSS,
     MIN_ALPHA,
     MIN_SHEEN_ALPHA,
@@ -30,7 +31,7 @@ from incpt.scene.material import Material
 Array = npt.NDArray[np.floating]
 
 _SAMPLES = 1024
-_STRETCHED_SAMPLES = 512
+_STRETCHED_SAMPLES = _GLASS_SAMPLES = 512
 _SHEEN_COSINES, _SHEEN_ANGLES = 256, 48
 """Points of the sums over the hemisphere."""
 
@@ -113,6 +114,46 @@ def stretched_rows() -> npt.NDArray[np.float32]:
     means = ((weighted[:, :, 1:] + weighted[:, :, :-1]) / 2 * np.diff(fine)[:, None]).sum(axis=2)
     flat = values.reshape(*values.shape[:2], -1)
     return np.concatenate([flat, means], axis=2).astype(np.float32)
+
+
+@lru_cache(maxsize=1)
+def glass_table() -> npt.NDArray[np.float32]:
+    """(GLASS_STEPS, GLASS_STEPS, GLASS_STEPS, 2): the share of the light that a rough boundary reflects or
+    lets through at once, by (eta - 1) / (eta + 1) from -1/2 to 1/2, roughness from 0 to 1, and root of the
+    cosine from 0 to 1: of one that reflects totally or not at all, and of one that reflects as Fresnel says.
+    The rest meets more microfacets.
+
+    As `eval_rough_boundary` has it: masking correlates with height for what is reflected alone.
+    """
+    grid = np.linspace(0.0, 1.0, GLASS_STEPS)
+    alpha = np.maximum(grid**2, MIN_ALPHA)[:, None, None]
+    cosine = np.maximum(grid, 0.03)[None, :, None] ** 2
+    wo = (np.sqrt(1 - cosine**2), np.zeros(1), cosine)
+    index = np.arange(_GLASS_SAMPLES)
+    u, v = index * ((5**0.5 - 1) / 2) % 1, (index + 0.5) / _GLASS_SAMPLES
+    h = _visible_normal(wo, (alpha, alpha), u, v)
+    o_h = sum(a * b for a, b in zip(wo, h, strict=True))
+
+    def lambda_(mu: Array) -> Array:
+        mu2 = np.clip(mu**2, 1e-12, 1.0)
+        return np.asarray((np.sqrt(1 + alpha**2 * (1 - mu2) / mu2) - 1) / 2)
+
+    mirrored = 2 * o_h * h[2] - cosine
+    masking = lambda_(cosine)
+    reflected = np.where(mirrored > 0, (1 + masking) / (1 + masking + lambda_(mirrored)), 0.0)
+    found = []
+    for step in np.linspace(-0.5, 0.5, GLASS_STEPS):
+        eta = (1 + step) / (1 - step)
+        inside = np.sqrt(np.clip(1 - (1 - o_h**2) / eta**2, 0.0, 1.0))
+        across = ((o_h - eta * inside) / (o_h + eta * inside)) ** 2
+        along = ((eta * o_h - inside) / (eta * o_h + inside)) ** 2
+        fresnel = np.where(inside > 0, (across + along) / 2, 1.0)
+        behind = (o_h / eta - inside) * h[2] - cosine / eta
+        passed = np.where(behind < 0, 1 / (1 + lambda_(behind)), 0.0)
+        shares = (np.floor(fresnel), fresnel)
+        both = [(share * reflected + (1 - share) * passed).mean(axis=-1) for share in shares]
+        found.append(np.stack(both, axis=-1))
+    return np.array(found, np.float32)
 
 
 @lru_cache(maxsize=1)

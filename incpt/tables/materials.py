@@ -99,18 +99,21 @@ def material_tables(
     # Of a material that lets all light through no opaque surface is ever shaded.
     opaque = [material for material in materials.values() if material.transmission < 1]
     traits = sum(1 << trait for trait in set().union(*map(traits_of, materials.values())))
+    is_media_smooth = all(material.roughness**2 <= layout.MIN_ALPHA for material in media)
+    unused = np.zeros(1, np.float32)
     is_stretched = bool(traits >> MaterialTrait.ANISOTROPY & 1)
     return MaterialTables(
         {
             "materials": device.upload(rows),
             "layers": device.upload(layers),
-            "stretched": device.upload(albedo.stretched_rows() if is_stretched else np.zeros(1, np.float32)),
+            "stretched": device.upload(albedo.stretched_rows() if is_stretched else unused),
+            "glass": device.upload(unused if is_media_smooth else albedo.glass_table()),
         },
         traits=traits,
         has_media=bool(media),
         is_matte=all(material.unlit or material.specular == material.metallic == 0 for material in opaque)
         and traits & ~_NOT_OF_LAYERS == 0,
         is_media_clear=not any(any(material.absorption) for material in media),
-        is_media_smooth=all(material.roughness**2 <= layout.MIN_ALPHA for material in media),
+        is_media_smooth=is_media_smooth,
         has_cutouts=any(material.is_cutout for material in materials.values()),
     )
