@@ -203,7 +203,7 @@ SECTIONS = {
 }
 SECTIONS |= {"Settings of the scene", "Display", "Measurements"}
 SHOWN_ONLY = {"Image", "Step time plot", "Device"}
-SHOWN_ONLY |= {"   File"}
+SHOWN_ONLY |= {"   File", "Textures"}
 MAPPED = ("normal_texture", "clearcoat_normal_texture")
 NOT_AT_FIRST = {f"Remove##{name}" for name in TEXTURES if name not in MAPPED}
 """Buttons that have nothing to do."""
