@@ -212,7 +212,8 @@ light_edits = st.builds(
     changes,
 )
 comings = st.builds(
-    lambda at: lambda s: s.with_added_light(replace(NEW, name=unique_name("new", s.names), position=at)), places
+    lambda at: lambda s: s.with_added_light(replace(NEW, name=unique_name("new", s.names), position=at)),
+    places,
 )
 goings = st.builds(
     lambda name: lambda s: s.without_light(name) if name in s.light_index else s,
