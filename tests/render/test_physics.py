@@ -333,11 +333,10 @@ def _sky() -> Environment:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", ["triangles", "environment", "both", "rough glass", "rough glass, direct"])
+@pytest.mark.parametrize("case", ["environment", "both", "rough glass", "rough glass, direct"])
 @pytest.mark.parametrize("technique", ["MIS_ONLY_LIGHT", "MIS_ONLY_BSDF"])
 def test_each_technique_alone_gives_the_same(case: str, technique: str) -> None:
     scene = {
-        "triangles": _plates(Environment()),
         "environment": _plates(_sky()).without_object("small").without_object("large"),
         "both": _plates(_sky()),
         "rough glass": _plates(Environment(), _FROSTED),

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from support.law import LARGE_STEPS
 from support.pairs import check, traced_pairs
 from support.renders import assert_same_mean, repeat
 from support.small_scenes import mixed_scene
@@ -183,6 +184,7 @@ def test_edits_then_convergence_equal_a_fresh_render(name: str, device: Device) 
 
 def assert_converges(session: Session, scene: Scene) -> None:
     """The picture becomes that of fresh renders with other random numbers, within their noise."""
+    session.configure(replace(session.settings, slots_per_step=LARGE_STEPS))
     session.render(256)
     fresh = repeat(replace(scene), 128, 4, size=session.size, max_bounces=3)
     noise = np.sqrt(fresh.var(axis=0, ddof=1).mean())
