@@ -510,6 +510,7 @@ def test_closed_meshes_are_watertight(device: Device, placement: dict[str, objec
     assert (world.occlude(origins, directions, np.inf) == 0).all()
 
 
+@pytest.mark.slow
 def test_no_ray_slips_through_where_reciprocals_are_two_ulps_off() -> None:
     mesh = shapes.shape("sphere")
     rng = np.random.default_rng(14)

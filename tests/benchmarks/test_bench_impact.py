@@ -192,6 +192,7 @@ def test_pictures_on_the_screen(bench: ImpactBench, start: EditBench) -> None:
     np.testing.assert_allclose(found[1].image, fresh.image(), rtol=1e-4, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_denoised_picture_comes_later(bench: ImpactBench, start: EditBench) -> None:
     bench._denoiser = Plain()  # type: ignore[assignment]
     bench._clock = Ticks()

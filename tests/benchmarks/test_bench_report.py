@@ -80,6 +80,7 @@ def test_scattered_rays_leave_surfaces_in_random_order(tracer: Tracer) -> None:
     assert np.isfinite(tracer.place(scattered).result()).mean() > 0.7
 
 
+@pytest.mark.slow
 def test_visits_count_tests(tracer: Tracer, device: Device) -> None:
     away = Rays(*(np.float32([[0, 50, 0]]), np.float32([[0, 1, 0]]), np.float32([np.inf])))
     assert tracer.visits(away) == (1, 0)  # the root of the top level, and nothing else

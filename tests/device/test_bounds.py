@@ -43,6 +43,7 @@ def test_no_kernel_leaves_its_buffers(oclgrind: str, scene: str, schedule: str, 
     assert "Invalid" not in found and "error" not in found.lower(), found[:3000]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scene", "schedule"), _RUNS)
 def test_kernels_survive_where_memory_ends(scene: str, schedule: str) -> None:
     command = [sys.executable, "-m", "support.checked", "memory", schedule, scene]

@@ -202,8 +202,11 @@ def test_the_setting_is_true_or_false(value: object) -> None:
         RenderSettings(aovs=value)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("in_blocks", [True, False])
 def test_build_leaves_no_kernel_to_be_built(monkeypatch: pytest.MonkeyPatch, in_blocks: bool) -> None:
+    # For what is built, launches of one size will do.
+    monkeypatch.setattr("incpt.render.wavefront.BUILD_SIZES", (1,))
     own = Device()
     session_of(own, mixed_scene(), in_blocks, aovs=False).build()
     session = session_of(own, mixed_scene(), in_blocks)

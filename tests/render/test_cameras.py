@@ -91,6 +91,7 @@ def test_light_of_a_point_does_not_depend_on_the_aperture() -> None:
     assert sums[1] == pytest.approx(sums[0], rel=0.03)
 
 
+@pytest.mark.slow
 @kinds
 def test_in_a_furnace_all_is_white(kind: str) -> None:
     scene = Scene(
@@ -220,6 +221,7 @@ def test_pixels_that_show_a_bit_of_what_changed_count_as_changed() -> None:
     assert blur.min() > 2 and shown[1].sum() < shown[1].size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("in_blocks", [True, False], ids=["blocks", "wavefront"])
 @pytest.mark.parametrize("near", [0.0, 2.2])
 def test_a_medium_around_the_near_plane_is_a_part_of_all_paths(near: float, in_blocks: bool) -> None:
@@ -245,6 +247,7 @@ def test_near_cuts_off_what_is_nearer() -> None:
         assert (hits.depth[np.isfinite(hits.depth)] >= near).all()
 
 
+@pytest.mark.slow
 def test_a_camera_starts_in_the_media_around_its_near_plane() -> None:
     materials = {
         "dark": Material((1, 1, 1), roughness=0, transmission=1, ior=1.0, specular=0, absorption=(1,) * 3)

@@ -59,6 +59,7 @@ def test_paths_that_carry_nothing_more_are_not_counted(device: Device, in_blocks
     assert share_cut_off(device, in_blocks, replace(GLASS, base_color=(0.1, 0, 0)), 0) > 0.9
 
 
+@pytest.mark.slow
 def test_other_ends_are_not_counted(device: Device, in_blocks: bool) -> None:
     rough = replace(GLASS, roughness=0.5)  # max_bounces is for these
     for material in (rough, replace(GLASS, transmission=0, roughness=0.3), replace(GLASS, ior=1.0)):

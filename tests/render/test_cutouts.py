@@ -164,6 +164,7 @@ def test_colours_at_corners_have_an_alpha_too() -> None:
     np.testing.assert_allclose(*images, rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_what_covers_in_part_and_shines_is_found_by_rays() -> None:
     """Half of the light of a lamp that covers half."""
     shining = Material((0, 0, 0), specular=0, emission=(5, 5, 5), double_sided=True)

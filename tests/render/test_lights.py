@@ -97,6 +97,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_floor_under_a_light(name: str) -> None:
     light, kind = CASES[name], CASES[name].kind

@@ -13,7 +13,7 @@ from incpt.scene.model import Scene
 
 _MOST_STEPS, _ENOUGH = 800, 64
 LARGE_STEPS = 384
-"""Slots of a step where only the picture at the end counts: it costs as much as a hundred paths to begin one."""
+"""Slots of a step where only the picture at the end counts: to begin one costs as much as many paths."""
 
 
 def assert_within_noise(device: Device, session: Session, scene: Scene, spp: int) -> None:

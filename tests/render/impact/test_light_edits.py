@@ -113,6 +113,7 @@ def in_blocks(request: pytest.FixtureRequest, device: Device) -> bool:
     return bool(request.param)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("edit", EDITS, ids=lambda edit: edit.name)
 def test_a_path_that_met_nothing_that_changed_brings_the_same(
     edit: Edit, in_blocks: bool, device: Device
@@ -167,6 +168,7 @@ def test_lights_of_two_scenes_bring_what_those_of_each_bring(
         assert_same_mean(plain, paired, relative=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["move a ball", "turn a spot", "add", "room: pane", "another kind"])
 def test_edits_then_convergence_equal_a_fresh_render(name: str, device: Device) -> None:
     edit = next(one for one in EDITS if one.name == name)

@@ -179,6 +179,7 @@ def in_blocks(request: pytest.FixtureRequest, device: Device) -> bool:
     return bool(request.param)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("edit", EDITS, ids=lambda edit: edit.name)
 def test_a_path_that_met_nothing_that_changed_brings_the_same(
     edit: Edit, in_blocks: bool, device: Device

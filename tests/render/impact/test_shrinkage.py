@@ -308,6 +308,7 @@ def test_other_guides_take_the_place_of_the_first(device: Device) -> None:
     assert np.abs(rig.picture() - first).max() > 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(70, 45), (530, 20)], ids=str)
 def test_groups_of_work_items_make_the_same_picture(
     size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
