@@ -353,6 +353,7 @@ def test_top_level_has_every_object_once(device: Device, count: int) -> None:
         assert (tree.nodes["child"] == layout.NODE_EMPTY).all()
 
 
+@pytest.mark.slow
 def test_refit_fits_the_new_vertices(device: Device) -> None:
     rng = np.random.default_rng(5)
     mesh = soup(rng, 2000)

@@ -283,6 +283,7 @@ def test_report_of_every_experiment(tmp_path: Path) -> None:
     assert "<b>million rays per second</b>" in text
 
 
+@pytest.mark.slow
 def test_report_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main.main(["bench", "report", str(tmp_path)]) == 2
     assert "no results" in capsys.readouterr().err
@@ -298,6 +299,7 @@ def test_every_experiment_has_tables_of_nothing(name: str) -> None:
     assert EXPERIMENTS[name].tables(Results())
 
 
+@pytest.mark.slow
 def test_plots_stand_for_themselves() -> None:
     law = fitted([1, 10, 100], [2, 20, 200])
     assert law is not None

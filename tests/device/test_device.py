@@ -186,6 +186,7 @@ def frosted_scene() -> Scene:
     return mixed_scene().with_material("glass", roughness=0.6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "make",
     [mixed_scene, half_clear_scene, frosted_scene, cornell, glass, plates],
@@ -205,6 +206,7 @@ def test_blocks_and_wavefront_agree(make: Callable[[], Scene], device: Device) -
     assert images[0].mean() == pytest.approx(images[1].mean(), rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [mixed_scene, cornell, glass, plates], ids=lambda make: make.__name__)
 def test_blocks_are_the_same_without_instructions_of_avx512(
     make: Callable[[], Scene], device: Device, monkeypatch: pytest.MonkeyPatch
@@ -221,6 +223,7 @@ def test_blocks_are_the_same_without_instructions_of_avx512(
     np.testing.assert_allclose(images[0], images[1], rtol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [mixed_scene, cornell], ids=lambda make: make.__name__)
 def test_blocks_of_every_size_make_the_same_picture(make: Callable[[], Scene], device: Device) -> None:
     if not traces_in_blocks(device):

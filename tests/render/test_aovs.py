@@ -222,6 +222,7 @@ def test_a_scene_file_may_ask_for_them(tmp_path: Path) -> None:
     assert registry.load(tmp_path / "a.toml").settings.aovs
 
 
+@pytest.mark.slow
 def test_under_impact_they_are_of_the_edited_scene(device: Device) -> None:
     """In a drag, too, where what the step before it showed is in neither scene, and after undo."""
     start = mixed_scene()

@@ -34,6 +34,7 @@ def nested(*bodies: tuple[str, float]) -> Scene:
     return Scene(camera, Environment((1, 1, 1)), materials, tuple(objects))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("in_blocks", [True, False], ids=["blocks", "wavefront"])
 @pytest.mark.parametrize(
     ("bodies", "depth"),

@@ -106,6 +106,7 @@ def test_in_a_furnace_all_is_white(kind: str) -> None:
     np.testing.assert_allclose(render(scene, 16, max_bounces=100, roulette_depth=200), 1, rtol=2e-3)
 
 
+@pytest.mark.slow
 @kinds
 @pytest.mark.parametrize("in_blocks", [True, False], ids=["blocks", "wavefront"])
 def test_what_is_picked_is_where_it_is_seen(kind: str, in_blocks: bool) -> None:
@@ -159,6 +160,7 @@ def test_a_change_is_seen_within_the_windows_of_its_object(kind: str) -> None:
     assert left < x < right and top < y < bottom
 
 
+@pytest.mark.slow
 @kinds
 def test_blocks_and_wavefront_agree(kind: str) -> None:
     scene = mixed_scene(size=(53, 37), base_nor=8).with_camera(**KINDS[kind])
@@ -198,6 +200,7 @@ def test_an_edit_behind_a_lens_converges_to_a_fresh_render() -> None:
     assert abs(bias) < 5 * np.sqrt((noise**2).mean() * 1.25 / mean.size)
 
 
+@pytest.mark.slow
 def test_pixels_that_show_a_bit_of_what_changed_count_as_changed() -> None:
     """Behind a lens that is as far as the blur reaches, whatever the middle of the lens sees."""
     shown = []

@@ -112,6 +112,7 @@ def test_blocks_and_wavefront_agree(make: Any) -> None:
     assert images[0].mean() == pytest.approx(images[1].mean(), rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("strategy", ["restart", "spiral", "impact"])
 def test_another_limit_starts_the_picture_over(strategy: str) -> None:
     scene = mixed_scene(strategy=strategy, base_nor=4)

@@ -45,6 +45,7 @@ def share_cut_off(device: Device, in_blocks: bool, material: Material, passages:
     return report.cut_off / report.paths
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("passages", [0, 1, 2, 3])
 def test_the_share_is_what_fresnel_leaves_in_the_pane(device: Device, in_blocks: bool, passages: int) -> None:
     # The first passage leads in. Of those behind it a path takes another where it is reflected inside.

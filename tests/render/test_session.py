@@ -76,6 +76,7 @@ def test_repetitions_equal_refinement_passes(
     assert_same(rendered(device, mixed_scene(base_nor=nor, slots_per_step=slots), 64).image(), converged)
 
 
+@pytest.mark.slow
 def test_nor_256_equals_256_refinement_passes(device: Device) -> None:
     passes = rendered(device, mixed_scene(), 256).image()
     tile = rendered(device, mixed_scene(base_nor=256, slots_per_step=100), 256)
@@ -306,6 +307,7 @@ def test_nobody_else_writes_to_what_a_session_goes_by(device: Device) -> None:
     assert session.tile_spp.min() > 0
 
 
+@pytest.mark.slow
 def test_step_takes_as_many_slots_as_it_is_given(device: Device, converged: np.ndarray) -> None:
     session = Session(mixed_scene(slots_per_step=1), device=device)
     assert [session.step(slots).paths // 64 for slots in (1, 5, 3, 1000, 24)] == [1, 5, 3, 15, 24]

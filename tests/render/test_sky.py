@@ -122,6 +122,7 @@ def test_a_true_sun_has_no_noise_to_speak_of() -> None:
     assert image.std() < 0.12 * image.mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sky", [Sky(25, sun_size=4), Sky(25, sun_disc=False)], ids=["sun", "no sun"])
 def test_blocks_and_wavefront_agree(sky: Sky) -> None:
     scene, images = skied(sky, size=(53, 37), base_nor=8), []

@@ -122,12 +122,14 @@ def test_a_path_that_met_nothing_that_changed_brings_the_same(
     check(traced_pairs(device, old, edit.apply(old), in_blocks), edit.at_most)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("edit", EDITS[:4], ids=lambda edit: edit.name)
 def test_undo_is_an_edit_too(edit: Edit, in_blocks: bool, device: Device) -> None:
     old = edit.scene()
     check(traced_pairs(device, edit.apply(old), old, in_blocks), edit.at_most)
 
 
+@pytest.mark.slow
 def test_far_from_the_origin(in_blocks: bool, device: Device) -> None:
     """Where a float is a millimetre wide, boxes around lights hold what rays meet of them."""
     scene, offset = mixed(), (8000.0, 100.0, -6000.0)
