@@ -56,6 +56,7 @@ CASES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "key"), CASES)
 def test_a_number_is_typed(user: Desk, kind: str, key: str) -> None:
     turn_to(user, kind)
@@ -72,6 +73,7 @@ def test_a_number_is_typed(user: Desk, kind: str, key: str) -> None:
     assert changes(before, state(user.editor)) == {"notices"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "key"), [(kind, key) for kind in KINDS for key in keys_of(kind) if key in BOXES]
 )
