@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -264,6 +265,11 @@ class ImpactBench:
         return statistics.median(times)
 
 
+def _median_ms(seconds: Sequence[float]) -> float:
+    """NaN where there was none, because the edit alone took all the time."""
+    return 1e3 * statistics.median(seconds) if seconds else math.nan
+
+
 _Read = tuple[FloatImage, ...]
 """A picture as it is read from a session; with the setting `aovs` the guides of a denoiser too."""
 
@@ -326,8 +332,8 @@ class _Clock:
         """Columns of a result."""
         return {
             "edit_ms": 1e3 * self._edit_s,
-            "step_ms": 1e3 * statistics.median(self._step_s),
-            "picture_ms": 1e3 * statistics.median(self._picture_s),
+            "step_ms": _median_ms(self._step_s),
+            "picture_ms": _median_ms(self._picture_s),
             "pictures": len(self._picture_s),
             "paths_per_second": self._purse.paths / self.elapsed,
         }

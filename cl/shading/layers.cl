@@ -53,7 +53,7 @@ INLINE LayeredBsdf layered_bsdf(const SurfaceMaterial *m, AlbedoTables tables, f
     return s;
 }
 
-// A column of the table of albedos, between its cosines and its rows.
+// A column of the table of albedos, between its cosines, or roots of them, and its rows.
 INLINE float albedo_at(__global const float *column, float row_share, float cosine) {
     float place = CLAMP(cosine, 0.0f, 1.0f) * (float)(ALBEDO_TABLE_SIZE - 1u);
     uint cell = MIN((uint)place, ALBEDO_TABLE_SIZE - 2u);
@@ -71,7 +71,7 @@ INLINE float coat_albedo(const LayeredBsdf *s, float cosine) {
 
 // Of white sheen; it may be above 1.
 INLINE float sheen_albedo(const LayeredBsdf *s, float cosine) {
-    return albedo_at(s->sheen_albedos, s->sheen_share, cosine);
+    return albedo_at(s->sheen_albedos, s->sheen_share, SQRT(CLAMP(cosine, 0.0f, 1.0f)));
 }
 
 // Lambda of Smith's masking, the fit of Estevez and Kulla: between that of a narrow and of a wide

@@ -160,7 +160,7 @@ def glass_table() -> npt.NDArray[np.float32]:
 def rows() -> npt.NDArray[np.float32]:
     """(roughness, ALBEDO_ROW_SIZE): A at all cosines, B at all cosines, and their means over the hemisphere,
     for materials whose textures change what the albedo depends on, and for clearcoats; then the albedo of
-    sheen at all cosines."""
+    sheen at all roots of cosines."""
     a, b = table()
     means = [[_mean(first), _mean(second)] for first, second in zip(a, b, strict=True)]
     return np.concatenate([a, b, means, sheen_table()], axis=1).astype(np.float32)
@@ -168,11 +168,11 @@ def rows() -> npt.NDArray[np.float32]:
 
 @lru_cache(maxsize=1)
 def sheen_table() -> Array:
-    """(roughness, cosine) what a white sheen reflects, at ALBEDO_TABLE_SIZE roughnesses and cosines from 0 to
-    1: the distribution and masking of A. Conty Estevez and C. Kulla, Production Friendly Microfacet Sheen
+    """(roughness, cosine) what a white sheen reflects, at ALBEDO_TABLE_SIZE roughnesses and roots of cosines
+    from 0 to 1: the distribution and masking of A. Conty Estevez and C. Kulla, Production Friendly Microfacet Sheen
     BRDF, SIGGRAPH Courses 2017. It is above 1 at grazing angles where the roughness is low."""
     grid = np.linspace(0.0, 1.0, ALBEDO_TABLE_SIZE)
-    mu_o = np.maximum(grid, 1e-3)[:, None, None]
+    mu_o = np.maximum(grid**2, 1e-4)[:, None, None]
     t = (np.arange(_SHEEN_COSINES) + 0.5) / _SHEEN_COSINES
     mu_i, area = (t**2)[None, :, None], (2 * t / _SHEEN_COSINES)[None, :, None]
     phi = (np.arange(_SHEEN_ANGLES) + 0.5) * np.pi / _SHEEN_ANGLES

@@ -167,8 +167,8 @@ def test_albedo_of_sheen(row: int) -> None:
     phi = (np.arange(m) + 0.5) * 2 * np.pi / m
     wi = direction(np.arccos(t**2)[:, None], phi[None, :]).reshape(3, -1)
     area = np.repeat(2 * t / n, m) * 2 * np.pi / m
-    for column in (2, 6, 14, 24, 31):
-        wo = direction(np.arccos(column / last), 0.0)[:, None]
+    for column in (5, 9, 16, 24, 31):
+        wo = direction(np.arccos((column / last) ** 2), 0.0)[:, None]
         expected = float((paper_sheen(row / last, wo, wi) * area).sum())
         assert albedo.sheen_table()[row, column] == pytest.approx(expected, rel=0.02, abs=2e-3)
 

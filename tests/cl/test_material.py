@@ -341,6 +341,14 @@ def test_no_layered_material_makes_light() -> None:
     assert least > 0.6
 
 
+@pytest.mark.parametrize("roughness", [0.0, 0.15, 0.3])
+def test_narrow_sheen_makes_no_light_at_grazing_angles(roughness: float) -> None:
+    """Where its distribution alone would reflect more than arrives."""
+    white = Material((1, 1, 1), specular=0, sheen_color=(1, 1, 1), sheen_roughness=roughness)
+    for angle in (80.0, 86.0, 89.0):
+        assert reflected_share(white, angle).max() < 1.01
+
+
 @pytest.mark.parametrize("name", MATERIALS)
 def test_variant_for_all_traits_is_the_same(name: str) -> None:
     """What a material does not have makes no difference where another one of the scene has it."""

@@ -37,7 +37,11 @@ LEAF = Material(
     (0.2, 0.4, 0.1), roughness=0.5, diffuse_transmission=0.6, diffuse_transmission_color=(0.5, 0.7, 0.1)
 )
 TINTED = Material((0.2, 0.2, 0.6), roughness=0.4, specular_color=(3, 1, 0.4))
-WALL = Material((0.9, 1, 0.9), roughness=0.35, transmission=1, thin_walled=True, specular_color=(1, 0.8, 1))
+WALL = Material(
+    (0.9, 1, 0.9), roughness=0.35, transmission=1, thin_walled=True, specular_color=(1, 0.8, 1),
+    absorption=(9, 4, 2),
+)  # fmt: skip
+"""A wall absorbs nothing, whatever bodies of its material would."""
 PRISM = Material(WHITE, roughness=0.3, transmission=1, dispersion=4, ior=1.6)
 SIGN = Material((0.9, 0.5, 0.2), unlit=True)
 

@@ -103,8 +103,8 @@ def flat_box() -> Scene:
 
 
 def everything() -> Scene:
-    """What kernels can be asked for, at once: smooth glass and rough glass that absorbs, textures, holes,
-    colours of vertices, lights of every kind beside those of triangles, a sky with its sun, and a lens.
+    """What kernels can be asked for, at once: walls and rough glass that absorbs, every layer, textures,
+    holes, colours of vertices, lights of every kind beside those of triangles, a sky with its sun, and a lens.
 
     Each scene has kernels of its own to be built and simulated, so that one for each of these would take long
     and run through no more code. Its ball has not the twenty thousand triangles of the built-in sphere, from
@@ -115,9 +115,21 @@ def everything() -> Scene:
     slots = {texture_name(slot): image for slot in TextureSlot}
     materials = {
         **scene.materials,
-        "glass": replace(scene.material("glass"), roughness=0.5, transmission=0.5),
-        "smooth": scene.material("glass"),
-        "red": Material(base_color=(0.8, 0.1, 0.1), alpha_mode="blend", emission=(0.1, 0.1, 0.1), **slots),
+        "glass": replace(scene.material("glass"), roughness=0.5, transmission=0.5, dispersion=1.0),
+        "smooth": replace(scene.material("glass"), thin_walled=True),
+        "red": Material(
+            base_color=(0.8, 0.1, 0.1),
+            alpha_mode="blend",
+            emission=(0.1, 0.1, 0.1),
+            clearcoat=1.0,
+            sheen_color=(1.0, 1.0, 1.0),
+            sheen_roughness=1.0,
+            anisotropy=1.0,
+            iridescence=1.0,
+            diffuse_transmission=1.0,
+            **slots,
+        ),
+        "grey": replace(scene.material("grey"), unlit=True),
     }
     kinds = ("point", "spot", "sun", "rectangle", "disk", "sphere")
     lights = [Light(kind, kind, (0.5 * i - 1, 1, 1), (-50, 0, 0), radius=0.2) for i, kind in enumerate(kinds)]
