@@ -40,22 +40,23 @@ _PLANES = {
 }
 _CLASSES = {path_list: PathClass[path_list.name] for path_list in PathList}
 """Which paths are in which list."""
-_SHAPED, _CLAMP = "SHAPED_LIGHTS", "CLAMP_INDIRECT"
-_LIGHTS = ("ENVIRONMENT_IMAGE", "SUN", "TRIANGLE_LIGHTS", _SHAPED)
+_SHAPED, _TREE, _CLAMP = "SHAPED_LIGHTS", "LIGHT_TREE", "CLAMP_INDIRECT"
+_LIGHTS = ("ENVIRONMENT_IMAGE", "SUN", "TRIANGLE_LIGHTS", _SHAPED, _TREE)
 _TEXTURES = ("TEXTURES", "VERTEX_COLORS")
 _TRACED = (*_TEXTURES, "CUTOUTS")
 """Of first hits, which pass through lights."""
 _FEATURES: Mapping[str | None, tuple[str, ...]] = {
     "generate": ("LENS",),
-    "intersect": (*_TRACED, _SHAPED, "MEDIA", _CLAMP),
+    "intersect": (*_TRACED, _SHAPED, _TREE, "MEDIA", _CLAMP),
     "shade_miss": (*_LIGHTS, "MEDIA", _CLAMP),
+    "choose_lights": _LIGHTS,
     "sample_lights": (*_LIGHTS, *_TEXTURES),
     "touch_lights": (*_LIGHTS, *_TEXTURES),
     "shade_medium": (*_LIGHTS, *_TEXTURES, _CLAMP),
     "shade": (*_LIGHTS, *_TEXTURES, _CLAMP),
     "write_aovs": _TEXTURES,
     "first_hits": _TEXTURES,
-    "trace_shadow": (*_TRACED, _SHAPED),
+    "trace_shadow": (*_TRACED, _SHAPED, _TREE),
 }
 """The features of a scene without which a kernel would leave something out. Those that would only make it
 quicker, as they do blocks, would be more variants to build."""

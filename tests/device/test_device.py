@@ -291,6 +291,11 @@ VARIANTS = [
     (*LIGHTS, "SHAPED_LIGHTS", "MEDIA", "CHANGES"),
     (*LIGHTS[:1], "SHAPED_LIGHTS", *RESTRICTIONS[:3], "MATTE", "CHANGES"),
     ("SHAPED_LIGHTS", "MEDIA", *RESTRICTIONS, "PORTABLE_LANES"),
+    ("SHAPED_LIGHTS", "LIGHT_TREE"),
+    ("TRIANGLE_LIGHTS", "LIGHT_TREE", *RESTRICTIONS[:3], "CHANGES"),
+    (*LIGHTS, "SHAPED_LIGHTS", "LIGHT_TREE", "MEDIA", "CHANGES"),
+    (*LIGHTS, "SHAPED_LIGHTS", "LIGHT_TREE", *RESTRICTIONS[:3], "MATTE"),
+    ("TRIANGLE_LIGHTS", "SHAPED_LIGHTS", "LIGHT_TREE", "MEDIA", "PORTABLE_LANES"),
     ("CHANGES",),
     (*LIGHTS, "MEDIA", "CHANGES"),
     (*LIGHTS, "MEDIA", *RESTRICTIONS, "CHANGES"),
@@ -339,6 +344,8 @@ def test_kernels_build_without_warnings(device: Device) -> None:
             continue
         asked = [(), ("LENS",)] if file == "generate" else [()]
         for features in variants if "LIGHT_SAMPLING" in text else asked:
+            if file == "choose_lights" and "LIGHT_TREE" not in features:
+                continue
             if file == "sample_lights" and not set(features) & {*LIGHTS, "SHAPED_LIGHTS"}:
                 continue  # launched only where there is something to sample
             built = cl.Program(device.context, device.program_text(file, features))
