@@ -85,7 +85,7 @@ def paired_light_tables(
     textured = tuple(own.has(TextureSlot.EMISSION) for own in textures)
     if _takes_tree(old, new, pairs):
         triangles = paired_lights(old, new, 1.0, numbers)
-        suns = sum(map(_is_far, pairs))
+        suns = _sun_count(pairs)
         if len(pairs) > suns or triangles[0].count:
             return _paired_tree_tables(device, (old, new), pairs, triangles, has_image, textured)
     share, shaped = lights.share_of_triangles(has_image), (NO_SHAPED_LIGHTS, NO_SHAPED_LIGHTS)
@@ -104,7 +104,7 @@ def _takes_tree(old: Scene, new: Scene, pairs: list[_Pair]) -> bool:
     """Whether there are so many lights in both scenes together that they are chosen by a tree."""
     weights = common_weights(old, new)
     shining = {**_seen(old, weights), **_seen(new, weights)}
-    near = len(pairs) - sum(map(_is_far, pairs))
+    near = len(pairs) - _sun_count(pairs)
     return takes_tree(near + len(shining), sum(len(obj.mesh.faces) for obj in shining.values()))
 
 
@@ -117,7 +117,7 @@ def _paired_tree_tables(
     textured: Sequence[bool],
 ) -> tuple[LightTables, LightTables]:
     """Those of both scenes with one light tree, over all that is a light in one of them."""
-    suns = sum(map(_is_far, pairs))
+    suns = _sun_count(pairs)
     weights = [_common_weight(pair) for pair in pairs]
     emitters = triangles[0].emitters
     chosen = lights.tree_shares(has_image, emitters, weights[:suns], weights[suns:])
@@ -151,11 +151,18 @@ def _light_pairs(old: Scene, new: Scene) -> list[_Pair]:
     same where they have the same name."""
     before, after = ({light.name: light for light in emissive_lights(scene)} for scene in (old, new))
     pairs = [(before.get(name), after.get(name)) for name in {**before, **after}]
-    return sorted(pairs, key=lambda pair: not _is_far(pair))
+    # Suns stand in front in each scene, and hardly ever among ten thousand others.
+    has_suns = any(next(iter(lights.values())).is_far for lights in (before, after) if lights)
+    return sorted(pairs, key=lambda pair: not _is_far(pair)) if has_suns else pairs
 
 
 def _is_far(pair: _Pair) -> bool:
     return any(light is not None and light.is_far for light in pair)
+
+
+def _sun_count(pairs: list[_Pair]) -> int:
+    """How many suns stand in front of others."""
+    return next((i for i, pair in enumerate(pairs) if not _is_far(pair)), len(pairs))
 
 
 def _changed(pairs: list[_Pair]) -> npt.NDArray[np.bool_]:
@@ -163,7 +170,10 @@ def _changed(pairs: list[_Pair]) -> npt.NDArray[np.bool_]:
 
 
 def _common_weight(pair: _Pair) -> float:
-    return max(weight(light) for light in pair if light is not None)
+    first, second = pair
+    if first is None or second is None:
+        return weight(first or second)  # type: ignore[arg-type]
+    return weight(first) if first is second else max(weight(first), weight(second))
 
 
 def _triangle_power(old: Scene, new: Scene) -> float:
@@ -175,7 +185,7 @@ def _triangle_power(old: Scene, new: Scene) -> float:
 
 def paired_shaped_lights(pairs: list[_Pair], chosen: Shares) -> tuple[ShapedLights, ShapedLights]:
     """The lights of both scenes that are objects of their own. Those that differ have ShapedFlag.CHANGED."""
-    changed, suns = _changed(pairs), sum(map(_is_far, pairs))
+    changed, suns = _changed(pairs), _sun_count(pairs)
     first, second = (
         ShapedLights(
             shaped_planes([pair[i] for pair in pairs], chosen.lights, changed),

@@ -140,7 +140,7 @@ def _split(center: Array, order: Indices, edges: Indices, children: Indices) -> 
         factor = np.where(children > 1, _SHARE_OF_SEGMENT / np.where(widest > 0, widest, 1), 0)
         segment = np.repeat(rows, size)
         key = (ordered[np.arange(len(order)), axis[segment]] - least[rows, axis][segment]) * factor[segment]
-        order = order[np.argsort(segment + key, kind="stable")]
+        order = order[np.argsort(segment + key)]
         parts = np.stack([left, children - left], axis=1)
         middles = np.stack([edges[:-1], edges[:-1] + in_left], axis=1)
         exists = parts > 0

@@ -24,6 +24,7 @@ from incpt.tables.shaped_lights import (
     emissive_lights,
     shaped_planes,
     shares,
+    sun_count,
     tree_lights,
     weight,
 )
@@ -142,7 +143,7 @@ def light_tables(device: Device, scene: Scene, has_image: bool, textures: Textur
     objects, number = scene.objects, textures.emission_number
     is_textured = textures.has(TextureSlot.EMISSION)
     lights, shining = emissive_lights(scene), emissive_objects(scene)
-    near = sum(not light.is_far for light in lights)
+    near = len(lights) - sun_count(lights)
     if takes_tree(near + len(shining), sum(len(obj.mesh.faces) for obj in shining)):
         triangles = triangle_lights(scene, 1.0, number)
         if near or triangles.count:
@@ -152,7 +153,7 @@ def light_tables(device: Device, scene: Scene, has_image: bool, textures: Textur
         return LightTables.of(device, triangles, has_image, objects, is_textured)
     chosen = shares(has_image, triangle_power(scene), [weight(light) for light in lights])
     planes = shaped_planes(lights, chosen.lights, np.zeros(len(lights), np.bool_))
-    shaped = ShapedLights(planes, sum(light.is_far for light in lights), float(chosen.lights.sum()))
+    shaped = ShapedLights(planes, sun_count(lights), float(chosen.lights.sum()))
     triangles = triangle_lights(scene, chosen.triangles, number)
     return LightTables.of(device, triangles, has_image, objects, is_textured, shaped)
 
@@ -167,7 +168,7 @@ def _tree_tables(
 ) -> LightTables:
     """Those of a scene with a light tree over lights, suns first, and triangles that were chosen with a share
     of 1."""
-    suns = sum(light.is_far for light in lights)
+    suns = sun_count(lights)
     weights = [weight(light) for light in lights]
     chosen = tree_shares(has_image, triangles.emitters, weights[:suns], weights[suns:])
     tree = TreeBuffers.of(

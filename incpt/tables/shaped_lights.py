@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +16,6 @@ from incpt.tables.alias import alias_table, luminance
 from incpt.tables.light_tree import TreeLights, merged_cones
 
 Array = npt.NDArray[np.float64]
-_Value = TypeVar("_Value")
 
 SUN_RADIUS = 3.0
 """Metres. A sun counts as a lamp with the power that it sends into a scene of that radius."""
@@ -52,12 +50,21 @@ NO_SHAPED_LIGHTS = ShapedLights(np.zeros((len(ShapedPlane), 0), np.float32))
 def emissive_lights(scene: Scene) -> list[Light]:
     """Those that are there, suns first."""
     lights = [light for light in scene.lights if light.is_emissive]
-    return [light for light in lights if light.is_far] + [light for light in lights if not light.is_far]
+    suns = [light for light in lights if light.kind == "sun"]
+    return suns + [light for light in lights if light.kind != "sun"] if suns else lights
+
+
+def sun_count(lights: Sequence[Light]) -> int:
+    """How many suns stand in front of others."""
+    return next((i for i, light in enumerate(lights) if not light.is_far), len(lights))
 
 
 def weight(light: Light) -> float:
     """The power that counts in choosing lights, W: the luminance of `Light.watts`."""
-    return _kept(light, "_weight", _weight)
+    known = light.__dict__
+    if "_weight" not in known:
+        known["_weight"] = _weight(light)
+    return float(known["_weight"])
 
 
 def _weight(light: Light) -> float:
@@ -65,14 +72,16 @@ def _weight(light: Light) -> float:
     return factor * float(luminance(light.watts))
 
 
-def _kept(light: Light, name: str, make: Callable[[Light], _Value]) -> _Value:
-    """What was made of a light before. It is kept with the light, which never changes: an edit changes one of
-    ten thousand lights, and all of them stand in the new table."""
-    known = vars(light)
-    if name not in known:
-        known[name] = make(light)
-    value: _Value = known[name]
-    return value
+def _rows(lights: Sequence[Light | None], name: str, make: Callable[[Light], bytes]) -> bytes:
+    """What `make` makes of each light, one after the other; of None it is `_NOTHING`. It is kept with the
+    light, which never changes: an edit changes one of ten thousand lights, and all stand in the new table."""
+    try:
+        return b"".join([_NOTHING if light is None else light.__dict__[name] for light in lights])
+    except KeyError:
+        for light in lights:
+            if light is not None and name not in light.__dict__:
+                light.__dict__[name] = make(light)
+        return _rows(lights, name, make)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +113,7 @@ def shaped_planes(
     """(len(ShapedPlane), N): None is a light that another scene has in its place, which emits nothing
     here. `chances` (N,) of choosing each among all lights; `changed` (N,) see LightFlag.CHANGED. With
     `trails` the lights have them in a light tree, but for the suns in front: as many as are given less."""
-    columns = b"".join([_NOTHING if light is None else _kept(light, "_column", _column) for light in lights])
+    columns = _rows(lights, "_column", _column)
     planes = np.frombuffer(columns, np.float32).reshape(-1, len(ShapedPlane)).T.copy()
     flags = planes[ShapedPlane.FLAGS].view(np.uint32)
     flags |= changed.astype(np.uint32) * np.uint32(ShapedFlag.CHANGED)
@@ -158,8 +167,7 @@ _NOTHING = _nothing()
 
 def tree_lights(lights: Sequence[Light], first: int) -> TreeLights:
     """What the light tree needs to know of lights that are no suns; the first has the number `first`."""
-    known = b"".join([_kept(light, "_tree_row", _tree_row) for light in lights])
-    rows = np.frombuffer(known, np.float64).reshape(-1, _TREE_ROW_SIZE)
+    rows = np.frombuffer(_rows(lights, "_tree_row", _tree_row), np.float64).reshape(-1, _TREE_ROW_SIZE)
     return TreeLights(
         rows[:, :6].reshape(-1, 2, 3),
         rows[:, 6:9],

@@ -131,7 +131,7 @@ def test_the_ends_of_the_choices_lead_to_lights() -> None:
     ends = np.array([0.0, 2.0**-24, 0.5, 0.99999994], np.float32)
     for position in np.random.default_rng(2).uniform(-2, 2, (200, 3)):
         number, chance = sampled(tree, ends, np.broadcast_to(position, (4, 3)), None)
-        assert ((0 <= number) & (number < 13)).all() and (chance > 0).all()
+        assert ((number >= 0) & (number < 13)).all() and (chance > 0).all()
 
 
 def brings(lights: TreeLights, position: Array, normal: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The light tree as the host builds it: every light is where its trail leads, within all bounds on the way."""
+"""The light tree as the host builds it: lights are where their trails lead, within all bounds on the way."""
 
 from __future__ import annotations
 
@@ -20,11 +20,10 @@ def ways(tree: Tree) -> list[list[tuple[int, int]]]:
     found = []
     for trail in tree.trails.tolist():
         way, reference = [], 0
-        for _ in range(tree.levels):
-            way.append((reference, trail & 7))
+        for level in range(tree.levels):
+            way.append((reference, trail >> LIGHT_TREE_BITS * level & 7))
             reference = int(tree.nodes["child"][way[-1]])
-            trail >>= LIGHT_TREE_BITS
-        assert trail == 0 and reference & layout.NODE_LEAF
+        assert trail < 1 << LIGHT_TREE_BITS * tree.levels and reference & layout.NODE_LEAF
         found.append(way)
     return found
 
