@@ -23,7 +23,7 @@ from incpt.tables.light_tree import LightTree, TreeLights, merged_cones
 
 Array = npt.NDArray[np.float64]
 
-LEAST_LAMPS = 24
+LEAST_LAMPS = 32
 """From how many lamps on lights have a tree: lights of their own, and objects that shine."""
 LEAST_TRIANGLES = 4096
 """From how many emissive triangles on."""
