@@ -166,6 +166,36 @@ def test_both_techniques_find_the_same(name: str, technique: str, trees: Callabl
     assert_same_mean(both, alone, relative=0.02)
 
 
+def wall_of_lights(roughness: float, metallic: float) -> Scene:
+    """A floating floor before a wall of a hundred panes, half of them below the floor: large and near, so that
+    both techniques find them, and the normal of the floor says much of their chances."""
+    panes = tuple(
+        Light(f"pane {i}", "rectangle", (0.2 * (i % 10) - 0.9, 0.2 * (i // 10) - 0.9, -0.8), (0, 180, 0),
+              size=(0.2, 0.2), radiance=1 + i % 3, camera_visible=False)
+        for i in range(100)
+    )  # fmt: skip
+    floor = Material((0.7, 0.7, 0.7), roughness=roughness, metallic=metallic, specular=0)
+    plane = Object("floor", shape("plane"), "floor", scale=(1.5, 1, 1.4))
+    camera = Camera((0, 1.2, 1.2), (0, 0, 0), fov_y=50)
+    return Scene(camera, Environment(), {"floor": floor}, (plane,), lights=panes)
+
+
+@pytest.mark.parametrize(("roughness", "metallic"), [(1.0, 0.0), (0.4, 1.0)], ids=["matte", "glossy"])
+def test_weights_of_large_lights(
+    roughness: float, metallic: float, trees: Callable[[bool], None], device: Device
+) -> None:
+    """What a ray knows of the density of a light is what the sample knew, else their weights miss 1."""
+    images = []
+    for wanted in (False, True):
+        trees(wanted)
+        images.append(repeat(wall_of_lights(roughness, metallic), 256, max_bounces=0))
+    assert_same_mean(*images, relative=0.002)
+    session = Session(wall_of_lights(roughness, metallic), (32, 32), RenderSettings(max_bounces=0), device)
+    session._tracer = Wavefront(device)
+    session.render(512)
+    assert session.image().mean() == pytest.approx(images[0].mean(), rel=0.005)
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_schedules_agree(name: str, device: Device, trees: Callable[[bool], None]) -> None:
     if not traces_in_blocks(device):
