@@ -167,8 +167,8 @@ def test_both_techniques_find_the_same(name: str, technique: str, trees: Callabl
 
 
 def wall_of_lights(roughness: float, metallic: float) -> Scene:
-    """A floating floor before a wall of a hundred panes, half of them below the floor: large and near, so that
-    both techniques find them, and the normal of the floor says much of their chances."""
+    """A floating floor before a wall of a hundred panes, half of them below the floor: large and near, so
+    that both techniques find them, and the normal of the floor says much of their chances."""
     panes = tuple(
         Light(f"pane {i}", "rectangle", (0.2 * (i % 10) - 0.9, 0.2 * (i // 10) - 0.9, -0.8), (0, 180, 0),
               size=(0.2, 0.2), radiance=1 + i % 3, camera_visible=False)
