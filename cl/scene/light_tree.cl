@@ -25,17 +25,14 @@ typedef struct {
 #define LIGHT_MAX8(a, b) ((a) > (b) ? (a) : (b))
 #define LIGHT_CLAMP8(x, low, high) LIGHT_MIN8(LIGHT_MAX8(x, (float8)(low)), (float8)(high))
 
-// 1 / sqrt(x), relative error below 2e-3, for x above 1e-30; and below 5e-6.
-INLINE float8 light_fast_rsqrt(const float8 x) {
-#if defined(__AVX__) && defined(__clang__)
-    return __builtin_ia32_rsqrtps256(x);
-#else
-    const float8 y = as_float8(0x5f375a86 - (as_int8(x) >> 1));
-    return y * (1.5f - 0.5f * x * y * y);
-#endif
-}
+// 1 / sqrt(x), relative error below 5e-6, for x above 1e-30. The cones of narrow spots magnify it.
 INLINE float8 light_rsqrt(const float8 x) {
-    const float8 y = light_fast_rsqrt(x);
+#if defined(__AVX__) && defined(__clang__) && !defined(PORTABLE_LANES)
+    const float8 y = __builtin_ia32_rsqrtps256(x);
+#else
+    float8 y = as_float8(0x5f375a86 - (as_int8(x) >> 1));
+    y = y * (1.5f - 0.5f * x * y * y);
+#endif
     return y * (1.5f - 0.5f * x * y * y);
 }
 
@@ -65,8 +62,7 @@ INLINE float8 light_importance(__global const LightNode *node, const Receiver *r
             inverse;
         const float8 cos_spread = LIGHT_PLANE(node, COS_SPREAD);
         const float8 sine2 = LIGHT_MAX8(1.0f - facing * facing, (float8)(1e-12f));
-        const float8 aside =
-            facing * cos_spread + sine2 * light_fast_rsqrt(sine2) * LIGHT_PLANE(node, SIN_SPREAD);
+        const float8 aside = facing * cos_spread + sine2 * light_rsqrt(sine2) * LIGHT_PLANE(node, SIN_SPREAD);
         const float8 nearest = facing >= cos_spread ? (float8)(1.0f) : aside;
         const float8 bound =
             (nearest + 1.5708f * seen - LIGHT_PLANE(node, COS_FALLOFF)) * LIGHT_PLANE(node, FALLOFF_SCALE);
@@ -98,7 +94,7 @@ typedef struct {
 
 // The bits of a comparison, see bvh_lanes.
 INLINE uint light_lanes(const int8 comparison) {
-#if defined(__AVX__) && defined(__clang__)
+#if defined(__AVX__) && defined(__clang__) && !defined(PORTABLE_LANES)
     return (uint)__builtin_ia32_movmskps256(as_float8(comparison));
 #else
     const int8 bit = comparison & (int8)(1, 2, 4, 8, 16, 32, 64, 128);

@@ -25,7 +25,7 @@ Array = npt.NDArray[np.float64]
 
 LEAST_LAMPS = 32
 """From how many lamps on lights have a tree: lights of their own, and objects that shine."""
-LEAST_TRIANGLES = 4096
+LEAST_TRIANGLES = 16_384
 """From how many emissive triangles on."""
 
 

@@ -360,6 +360,22 @@ def test_most_paths_do_not_ask_for_one_of_many(
     assert traced_pairs(device, old, edit(old), traces_in_blocks(device)).touched.mean() < 0.4
 
 
+@pytest.mark.parametrize("name", ["add", "remove"])
+def test_an_edit_that_brings_or_ends_the_tree(
+    name: str, in_blocks: bool, device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both scenes have it while they are compared, as the one with more lamps has."""
+    make, edit = EDITS[name]
+    old = make()
+    new = edit(old)
+    shining = sum(old.materials[obj.material].is_emissive for obj in old.objects)
+    monkeypatch.setattr(tree_tables, "LEAST_LAMPS", max(len(old.lights), len(new.lights)) - 1 + shining)
+    assert has_tree(old, device) != has_tree(new, device)
+    pair = paired_tables(GeometryPool.of(device), old, new)
+    assert all("LIGHT_TREE" in tables.variant for tables in pair)
+    check(traced_pairs(device, old, new, in_blocks))
+
+
 @pytest.mark.parametrize("name", ["move", "add", "remove", "triangles go", "recolour"])
 def test_pairs_have_one_tree(name: str, device: Device, trees: Callable[[bool], None]) -> None:
     trees(True)
