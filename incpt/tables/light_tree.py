@@ -95,25 +95,35 @@ def build(lights: TreeLights) -> LightTree:
     count = len(lights.numbers)
     levels = level_count(count)
     center = lights.bounds.mean(axis=1)
-    order = np.arange(count)
-    edges = np.array([0, count])
-    trails = np.zeros(count, np.uint32)
-    parts: list[tuple[npt.NDArray[np.void], npt.NDArray[np.void]]] = []
-    first = 0
+    order, edges = np.arange(count), np.array([0, count])
+    fans, all_edges = [], []
     for level in range(levels):
         capacity = _WIDTH ** (levels - level - 1)
-        children = -(-np.diff(edges) // capacity)  # of each node of the level
-        order, child_edges = _split(center, order, edges, children)
-        node = np.repeat(np.arange(len(children)), children)
-        slot = np.arange(len(node)) - np.repeat(np.cumsum(children) - children, children)
-        first += len(children)
-        is_last = level == levels - 1
-        references = layout.NODE_LEAF | lights.numbers[order] if is_last else first + np.arange(len(node))
-        parts.append(_nodes(lights, order, child_edges, node, slot, references.astype(np.uint32)))
-        trails[order] |= np.repeat((slot << LIGHT_TREE_BITS * level).astype(np.uint32), np.diff(child_edges))
-        edges = child_edges
-    nodes, boxes = (np.concatenate(part) for part in zip(*parts, strict=True))
-    # Later levels have sorted the lights of a node among its children only, so that trails are right.
+        fans.append(-(-np.diff(edges) // capacity))  # children of each node of the level
+        if capacity > 1:
+            order, edges = _split(center, order, edges, fans[-1])
+        else:
+            edges = np.arange(count + 1)
+        all_edges.append(edges)
+
+    trails = np.zeros(count, np.uint32)
+    groups = _Groups.of(lights, order)
+    references = layout.NODE_LEAF | lights.numbers[order]
+    first = sum(map(len, fans))
+    parts: list[tuple[npt.NDArray[np.void], npt.NDArray[np.void]]] = []
+    for level in reversed(range(levels)):
+        fan = fans[level]
+        starts = np.cumsum(fan) - fan
+        node = np.repeat(np.arange(len(fan)), fan)
+        slot = np.arange(len(node)) - starts[node]
+        parts.append(_nodes(groups, node, slot, references))
+        trails[order] |= np.repeat(
+            (slot << LIGHT_TREE_BITS * level).astype(np.uint32), np.diff(all_edges[level])
+        )
+        groups = groups.joined(starts, node)
+        first -= len(fan)
+        references = (first + np.arange(len(fan))).astype(np.uint32)
+    nodes, boxes = (np.concatenate(part[::-1]) for part in zip(*parts, strict=True))
     return LightTree(nodes, boxes, trails)
 
 
@@ -149,75 +159,94 @@ def _split(center: Array, order: Indices, edges: Indices, children: Indices) -> 
     return order, edges
 
 
-def _nodes(
-    lights: TreeLights,
-    order: Indices,
-    edges: Indices,
-    node: Indices,
-    slot: Indices,
-    references: npt.NDArray[np.uint32],
-) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
-    """The nodes of a level: child i has the lights from edges[i] on, and is `slot[i]` of node[i]."""
-    starts = edges[:-1]
-    owner = np.repeat(np.arange(len(starts)), np.diff(edges))
-    least, greatest = lights.bounds[order, 0], lights.bounds[order, 1]
-    low, high = np.minimum.reduceat(least, starts), np.maximum.reduceat(greatest, starts)
-    share = np.maximum(lights.power / lights.power.sum(), _LEAST_POWER)[order]
-    power = np.add.reduceat(share, starts)
-    axis, spread, falloff = _cones(lights, order, starts, owner, share)
+@dataclass(frozen=True, eq=False)
+class _Groups:
+    """What is known of N groups of lights: `low` and `high` (N, 3) of their bounds, and of boxes around what
+    rays may meet of them, infinite where that is nothing; the share of all power (N,); see `TreeLights` for
+    the rest."""
 
+    low: Array
+    high: Array
+    met_low: Array
+    met_high: Array
+    share: Array
+    axis: Array
+    spread: Array
+    falloff: Array
+
+    @classmethod
+    def of(cls, lights: TreeLights, order: Indices) -> _Groups:
+        """Each light a group of its own, in that order."""
+        low, high, met = lights.bounds[order, 0], lights.bounds[order, 1], lights.met[order][:, None]
+        # Lights stand where single precision has them, and so do the points in which rays meet them.
+        slack = _BOX_SLACK * (np.maximum(np.abs(low), np.abs(high)) + (high - low))
+        return cls(
+            low,
+            high,
+            np.where(met, low - slack, np.inf),
+            np.where(met, high + slack, -np.inf),
+            np.maximum(lights.power / lights.power.sum(), _LEAST_POWER)[order],
+            lights.axis[order],
+            lights.spread[order],
+            np.maximum(lights.falloff, _LEAST_FALLOFF)[order],
+        )
+
+    def joined(self, starts: Indices, owner: Indices) -> _Groups:
+        """Groups of these groups: each begins at one of `starts`; `owner` (N,) are their numbers."""
+        share = np.add.reduceat(self.share, starts)
+        axis = np.add.reduceat(self.axis * self.share[:, None], starts)
+        length = np.linalg.norm(axis, axis=1)
+        has_middle = length > 1e-6 * share
+        axis = np.where(
+            has_middle[:, None], axis / np.where(has_middle, length, 1)[:, None], self.axis[starts]
+        )
+        spread = np.maximum.reduceat(_angle(axis[owner], self.axis) + self.spread, starts)
+        return _Groups(
+            np.minimum.reduceat(self.low, starts),
+            np.maximum.reduceat(self.high, starts),
+            np.minimum.reduceat(self.met_low, starts),
+            np.maximum.reduceat(self.met_high, starts),
+            share,
+            axis,
+            np.where(spread < _EVERYWHERE, spread, np.pi),
+            np.maximum.reduceat(self.falloff, starts),
+        )
+
+
+def _nodes(
+    groups: _Groups, node: Indices, slot: Indices, references: npt.NDArray[np.uint32]
+) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
+    """The nodes of a level: group i is `slot[i]` of node[i]."""
     count = int(node[-1]) + 1
     nodes = np.zeros(count, layout.LIGHT_NODE)
     plane, planes = LightNodePlane, nodes["planes"]
-    middle = ((low + high) / 2).astype(np.float32)
+    middle = ((groups.low + groups.high) / 2).astype(np.float32)
     # From the middle as it is stored, so that the ball holds the box.
-    radius = np.linalg.norm(np.maximum(high - middle, middle - low), axis=1)
+    radius = np.linalg.norm(np.maximum(groups.high - middle, middle - groups.low), axis=1)
+    cos_falloff = np.cos(groups.falloff)
     planes[node, plane.CENTER_X : plane.CENTER_Z + 1, slot] = middle
     planes[node, plane.RADIUS, slot] = radius
-    planes[node, plane.POWER, slot] = power
-    planes[node, plane.AXIS_X : plane.AXIS_Z + 1, slot] = axis
-    planes[node, plane.COS_SPREAD, slot] = np.cos(spread)
-    planes[node, plane.SIN_SPREAD, slot] = np.sin(spread)
-    planes[node, plane.COS_FALLOFF, slot] = np.cos(falloff)
-    planes[node, plane.FALLOFF_SCALE, slot] = 1 / (1 - np.cos(falloff))
+    planes[node, plane.POWER, slot] = groups.share
+    planes[node, plane.AXIS_X : plane.AXIS_Z + 1, slot] = groups.axis
+    planes[node, plane.COS_SPREAD, slot] = np.cos(groups.spread)
+    planes[node, plane.SIN_SPREAD, slot] = np.sin(groups.spread)
+    planes[node, plane.COS_FALLOFF, slot] = cos_falloff
+    planes[node, plane.FALLOFF_SCALE, slot] = 1 / (1 - cos_falloff)
     nodes["child"] = layout.NODE_EMPTY
     nodes["child"][node, slot] = references
     nodes["last"] = np.bincount(node) - 1
-    nodes["directed"][node[spread < _EVERYWHERE]] = 1
+    nodes["directed"][node[groups.spread < _EVERYWHERE]] = 1
 
-    met = lights.met[order]
     boxes = np.zeros(count, layout.NODE)
     bounds = boxes["bounds"]
     bounds[:, 0::2], bounds[:, 1::2] = np.inf, -np.inf
-    # Lights stand where single precision has them, and so do the points in which rays meet them.
-    slack = _BOX_SLACK * (np.maximum(np.abs(least), np.abs(greatest)) + (greatest - least))
-    met_low = np.minimum.reduceat(np.where(met[:, None], least - slack, np.inf), starts)
-    met_high = np.maximum.reduceat(np.where(met[:, None], greatest + slack, -np.inf), starts)
-    infinity = np.float32(np.inf)
-    bounds[node, 0::2, slot] = met_low
-    bounds[node, 1::2, slot] = met_high
-    is_met = np.isfinite(met_low[:, 0])
-    bounds[node[~is_met], 0::2, slot[~is_met]] = infinity
-    bounds[node[~is_met], 1::2, slot[~is_met]] = -infinity
+    bounds[node, 0::2, slot] = groups.met_low
+    bounds[node, 1::2, slot] = groups.met_high
     boxes["child"] = nodes["child"]
+    is_met = np.isfinite(groups.met_low[:, 0])
     boxes["child"][node[~is_met], slot[~is_met]] = layout.NODE_EMPTY
     boxes["order"] = _orders(bounds)
     return nodes, boxes
-
-
-def _cones(
-    lights: TreeLights, order: Indices, starts: Indices, owner: Indices, share: Array
-) -> tuple[Array, Array, Array]:
-    """Axis (M, 3), spread and falloff (M,) of the groups that begin at `starts`."""
-    own_axis, own_spread = lights.axis[order], lights.spread[order]
-    axis = np.add.reduceat(own_axis * share[:, None], starts)
-    length = np.linalg.norm(axis, axis=1)
-    has_middle = length > 1e-6 * np.add.reduceat(share, starts)
-    axis = np.where(has_middle[:, None], axis / np.where(has_middle, length, 1)[:, None], own_axis[starts])
-    spread = np.maximum.reduceat(_angle(axis[owner], own_axis) + own_spread, starts)
-    spread = np.where(spread < _EVERYWHERE, spread, np.pi)
-    falloff = np.maximum.reduceat(np.maximum(lights.falloff, _LEAST_FALLOFF)[order], starts)
-    return axis, spread, falloff
 
 
 def _angle(a: Array, b: Array) -> Array:
