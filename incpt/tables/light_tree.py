@@ -108,7 +108,7 @@ def build(lights: TreeLights) -> LightTree:
 
     trails = np.zeros(count, np.uint32)
     groups = _Groups.of(lights, order)
-    references = layout.NODE_LEAF | lights.numbers[order]
+    references = (layout.NODE_LEAF | lights.numbers[order]).astype(np.uint32)
     first = sum(map(len, fans))
     parts: list[tuple[npt.NDArray[np.void], npt.NDArray[np.void]]] = []
     for level in reversed(range(levels)):
