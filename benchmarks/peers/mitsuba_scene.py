@@ -10,13 +10,14 @@ import mitsuba as mi
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core.layout import MIN_ALPHA, TextureSlot
+from incpt.core.layout import MIN_ALPHA, MaterialTrait, TextureSlot
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
 from incpt.scene.light import Light
 from incpt.scene.material import Material, texture_of
 from incpt.scene.model import Object, Scene
 from incpt.scene.texture import Bitmap, Texture
+from incpt.tables.materials import traits_of
 from incpt.tables.texels import linear_colors
 
 _COUNTERPARTS = (
@@ -63,6 +64,11 @@ def bsdf(material: Material) -> dict[str, Any]:
     used = [texture_of(material, slot) for slot in TextureSlot if slot not in _COUNTERPARTS]
     if any(texture is not None for texture in used) or material.normal_texture is not None:
         raise ValueError(f"{material} has textures that have no counterpart in Mitsuba")
+    traits = traits_of(material)
+    if MaterialTrait.THIN_WALLED in traits:
+        return thin_wall(material)
+    if traits - {MaterialTrait.ANISOTROPY} or (traits and material.metallic < 1):
+        raise ValueError(f"{material} has layers that have no counterpart in Mitsuba")
     alpha: Any = max(material.roughness**2, MIN_ALPHA)
     rough = material.metallic_roughness_texture
     if rough is not None:
@@ -73,19 +79,41 @@ def bsdf(material: Material) -> dict[str, Any]:
         alpha = bitmap(replace(rough, bitmap=Bitmap(np.maximum(squared, MIN_ALPHA))), is_color=False)
     white = material.base_color == (1, 1, 1) and material.base_color_texture is None
     if material.transmission == 1 and white and not any(material.absorption):
-        if material.roughness == 0:
-            return {"type": "dielectric", "int_ior": material.ior, "ext_ior": 1.0}
-        return {
-            "type": "roughdielectric", "distribution": "ggx", "alpha": alpha, "int_ior": material.ior,
-            "ext_ior": 1.0,
-        }  # fmt: skip
+        return body(material, alpha)
     if material.metallic == 1 and white:
-        metal = {"type": "roughconductor", "material": "none", "distribution": "ggx", "alpha": alpha}
-        return {"type": "twosided", "bsdf": metal}
+        metal = {"type": "roughconductor", "material": "none", "distribution": "ggx"}
+        return {"type": "twosided", "bsdf": {**metal, **stretched(material, alpha)}}
     if material.metallic == material.specular == material.transmission == 0:
         reflectance = colored(material.base_color, material.base_color_texture)
         return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": reflectance}}
     raise ValueError(f"{material} has no counterpart in Mitsuba")
+
+
+def body(material: Material, alpha: Any) -> dict[str, Any]:
+    """The boundary of a clear body in air."""
+    iors = {"int_ior": material.ior, "ext_ior": 1.0}
+    if material.roughness == 0:
+        return {"type": "dielectric", **iors}
+    return {"type": "roughdielectric", "distribution": "ggx", "alpha": alpha, **iors}
+
+
+def thin_wall(material: Material) -> dict[str, Any]:
+    """A wall without a thickness; raises ValueError where it is rough or has other layers."""
+    if len(traits_of(material)) > 1 or material.roughness > 0 or material.transmission < 1:
+        raise ValueError(f"{material} is a wall that has no counterpart in Mitsuba")
+    tint = {"type": "rgb", "value": list(material.base_color)}
+    return {"type": "thindielectric", "int_ior": material.ior, "specular_transmittance": tint}
+
+
+def stretched(material: Material, alpha: Any) -> dict[str, Any]:
+    """The roughness of metal along u and v. Raises ValueError where it lies between them."""
+    if material.anisotropy == 0:
+        return {"alpha": alpha}
+    if material.anisotropy_rotation not in (0, 90):
+        raise ValueError(f"{material} is turned, which has no counterpart in Mitsuba")
+    along = alpha + (1 - alpha) * material.anisotropy**2
+    first, second = (along, alpha) if material.anisotropy_rotation == 0 else (alpha, along)
+    return {"alpha_u": first, "alpha_v": second}
 
 
 def colored(factor: tuple[float, float, float], texture: Texture | None) -> dict[str, Any]:
@@ -115,7 +143,7 @@ def bitmap(texture: Texture, is_color: bool) -> dict[str, Any]:
 
 def mesh(obj: Object, material: Material, path: Path) -> dict[str, Any]:
     """The triangles in world space by way of a PLY file."""
-    vertices, faces, normals, uvs = world_mesh(obj, bool(_textures(material)))
+    vertices, faces, normals, uvs = world_mesh(obj, bool(_textures(material)) or material.anisotropy > 0)
     write_ply(path, vertices, faces, normals, uvs)
     shape = {
         "type": "ply",

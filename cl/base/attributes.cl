@@ -4,7 +4,7 @@
 // The weights of the corners add up to 1. What a mesh does not have is read from any place, and not used.
 
 // Whether a scene needs any of it.
-#if TEXTURES || defined(VERTEX_COLORS)
+#if TEXTURES || defined(VERTEX_COLORS) || HAS_TRAIT(ANISOTROPY)
 #define CORNER_ATTRIBUTES
 #endif
 

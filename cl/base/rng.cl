@@ -16,6 +16,8 @@
 #define PAIR_COVERAGE(ray, layer) (5u + 4u * MOST_RAYS + MOST_LAYERS * (ray) + (layer))
 // Beyond those of all rays, so that these are the same with a lens and without.
 #define PAIR_LENS 0x80000000u
+// Of the colour that a path follows where colours part.
+#define PAIR_CHANNEL(ray) (0x80000001u + (ray))
 
 typedef struct {
     float u, v;

@@ -34,16 +34,30 @@ INLINE Vec3 sample_cosine_hemisphere(float u, float v) {
     return vec3(radius * cosine, radius * sine, SQRT(MAX(1.0f - u, 0.0f)));
 }
 
-// A microfacet normal that is visible from wo (wo.z > 0) on a GGX surface, density G1(wo) D(h) <wo, h> /
-// wo.z. J. Dupuy and A. Benyoub, Sampling Visible GGX Normals with Spherical Caps, HPG 2023.
-INLINE Vec3 sample_visible_normal(Vec3 wo, float alpha, float u, float v) {
-    Vec3 stretched = normalize(vec3(alpha * wo.x, alpha * wo.y, wo.z));
+// A microfacet normal that is visible from wo (wo.z > 0) on a GGX surface that is stretched along its axes,
+// density G1(wo) D(h) <wo, h> / wo.z. J. Dupuy and A. Benyoub, Sampling Visible GGX Normals with Spherical
+// Caps, HPG 2023.
+INLINE Vec3 sample_stretched_normal(Vec3 wo, float alpha_x, float alpha_y, float u, float v) {
+    Vec3 stretched = normalize(vec3(alpha_x * wo.x, alpha_y * wo.y, wo.z));
     float sine, cosine;
     sincos_turns(u, &sine, &cosine);
     float z = (1.0f - v) * (1.0f + stretched.z) - stretched.z;
     float radius = SQRT(CLAMP(1.0f - z * z, 0.0f, 1.0f));
     Vec3 h = add(vec3(radius * cosine, radius * sine, z), stretched);
-    return normalize(vec3(alpha * h.x, alpha * h.y, MAX(h.z, 1e-7f)));
+    return normalize(vec3(alpha_x * h.x, alpha_y * h.y, MAX(h.z, 1e-7f)));
+}
+
+// The same of one that is not stretched.
+INLINE Vec3 sample_visible_normal(Vec3 wo, float alpha, float u, float v) {
+    return sample_stretched_normal(wo, alpha, alpha, u, v);
+}
+
+// Density 1 / (2 pi) per solid angle.
+INLINE Vec3 sample_hemisphere(float u, float v) {
+    float sine, cosine;
+    sincos_turns(v, &sine, &cosine);
+    float radius = SQRT(MAX(1.0f - u * u, 0.0f));
+    return vec3(radius * cosine, radius * sine, u);
 }
 
 // Barycentric coordinates of a point that is uniform on a triangle, for its second and third vertex.

@@ -158,3 +158,30 @@ INLINE float exp_negative(float x) {
              r * (4.1665795894e-2f + r * (8.3334519073e-3f + r * (1.3981999507e-3f + r * 1.9875691500e-4f))));
     return x < -87.0f ? 0.0f : (1.0f + r + r * r * p) * as_float(((int)n + 127) << 23);
 }
+
+// exp(x) for |x| <= 87, beyond that that of the nearest such x.
+INLINE float exponential(float x) {
+    float falling = exp_negative(-MIN(FABS(x), 87.0f));
+    return x > 0.0f ? 1.0f / falling : falling;
+}
+
+// The natural logarithm of x > 0 that is no denormal number, relative error below 2e-7 (S. Moshier's,
+// Cephes).
+INLINE float logarithm(float x) {
+    uint bits = as_uint(x);
+    float m = as_float((bits & 0x007fffffu) | 0x3f000000u); // x = m 2^e with m from 0.5 to 1
+    int low = m < 0.70710678f;
+    float e = (float)((int)(bits >> 23) - 126 - low);
+    m = (low ? 2.0f * m : m) - 1.0f;
+    float p = 7.0376836292e-2f;
+    p = -1.1514610310e-1f + m * p;
+    p = 1.1676998740e-1f + m * p;
+    p = -1.2420140846e-1f + m * p;
+    p = 1.4249322787e-1f + m * p;
+    p = -1.6668057665e-1f + m * p;
+    p = 2.0000714765e-1f + m * p;
+    p = -2.4999993993e-1f + m * p;
+    p = 3.3333331174e-1f + m * p;
+    float z = m * m;
+    return m + (m * z * p - 2.12194440e-4f * e - 0.5f * z) + 0.693359375f * e;
+}

@@ -1,15 +1,9 @@
+#include "base/features.cl"
 #include "base/scalar.cl"
 
 // Images on surfaces. All pixels of a device lie in one buffer of words, in the form that files have: bytes,
 // or half floats where there is more to them than bytes hold (tables/texture_pool.py). This is straight-line
 // code of scalars, so that PoCL runs it in SIMD lanes.
-
-// Which of TextureSlot some material of the scene has: the feature TEXTURES, with a number. Those that none
-// has are left out when kernels are built.
-#ifndef TEXTURES
-#define TEXTURES 0u
-#endif
-#define TEXTURED(slot) (TEXTURES >> SLOT_OF_##slot & 1u)
 
 typedef struct {
     Vec3 color;

@@ -13,7 +13,7 @@
 #if defined(BRUTE_FORCE) && defined(TOP_LEVEL_ONLY)
 #define BRUTE_FORCE_ONLY
 #endif
-#include "path/map_normal.cl"
+#include "path/tangents.cl"
 #include "path/setup_surface.cl"
 #include "path/shade_light.cl"
 #include "path/shade_miss.cl"
@@ -296,12 +296,12 @@ STAGE void setup_surfaces(const Block *block, BlockRay *ray) {
         const Surface surface = surface_at(&block->geometry, &hit);
         store_surface(&block->state, i, &surface);
     }
-#if TEXTURED(NORMAL)
+#ifdef TANGENTS
     LANES
     for (int i = 0; i < (int)count; i++) {
         Surface surface = load_surface(&block->state, i);
-        map_normal(block->geometry.objects, &block->shading, &surface);
-        store3(block->state.surfaces + SURFACE_SHADING_X * BLOCK_STRIDE, BLOCK_STRIDE, i, surface.shading);
+        set_tangents(block->geometry.objects, &block->shading, &surface);
+        store_tangents(&block->state, i, &surface);
     }
 #endif
 }

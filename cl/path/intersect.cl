@@ -1,9 +1,9 @@
 #include "path/coverage.cl"
-#include "path/map_normal.cl"
+#include "path/tangents.cl"
 #include "path/trace.cl"
 #include "path/light_search.cl"
 
-#if defined(CUTOUTS) || defined(SHAPED_LIGHTS) || TEXTURED(NORMAL)
+#if defined(CUTOUTS) || defined(SHAPED_LIGHTS) || defined(TANGENTS)
 #define NEEDS_SHADING
 #endif
 
@@ -64,9 +64,12 @@ __kernel __attribute__((vec_type_hint(float8))) void intersect(LAUNCH_PARAMETERS
         return;
     }
     Surface surface = surface_at(&geometry, &hit);
-#if TEXTURED(NORMAL)
-    map_normal(objects, &shading, &surface);
+#if defined(TANGENTS)
+    set_tangents(objects, &shading, &surface);
 #endif
     store_surface(&state, path, &surface);
+#ifdef TANGENTS
+    store_tangents(&state, path, &surface);
+#endif
     store_class(&state, path, hit_class(&geometry, materials, hit.object, is_in_medium(&state, path)));
 }

@@ -73,7 +73,8 @@ INLINE void prepare_choice(const Params *params, const Shading *shading, const S
     Surface surface = load_surface(state, path);
     Vec3 direction = load_ray(state->rays, STRIDE(state), path).direction;
     Vec3 normal = scale(dot(surface.geometric, direction) > 0.0f ? -1.0f : 1.0f, surface.geometric);
-    int is_opaque = shading->materials[surface.material].transmission <= 0.0f;
+    __global const Material *material = &shading->materials[surface.material];
+    int is_opaque = (material->transmission <= 0.0f) & (material->diffuse_transmission <= 0.0f);
     uint packed = is_opaque ? packed_normal(normal) : NO_INDEX;
     store_bits(state->paths, PATH_NORMAL * STRIDE(state) + path, packed);
     Receiver receiver = receiver_at(surface.position, packed);

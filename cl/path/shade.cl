@@ -1,5 +1,6 @@
 #include "path/surface_emission.cl"
 #include "path/clamp.cl"
+#include "shading/layers.cl"
 
 // What happens where a ray ends on an opaque surface: the path gathers what is emitted there, asks for a
 // shadow ray towards a light, and goes on in a direction that the material chooses.
@@ -23,15 +24,34 @@ INLINE void finish_path(const Params *params, const Shading *shading, const Stat
     store_class(state, path, 0u);
 }
 
+// Whether a ray in this direction, which is wi in the frame of the surface, leaves it on the side that it
+// scatters to, and where it starts. That is the side that the path has come to, and the other one where light
+// is transmitted diffusely.
+INLINE int leaves_surface(const Surface *surface, Vec3 direction, Vec3 wi, Vec3 *origin) {
+    float above = dot(surface->geometric, direction);
+#if HAS_TRAIT(DIFFUSE_TRANSMISSION)
+    float offset = above > 0.0f ? surface->offset : -surface->offset;
+    int leaves = above * wi.z > 0.0f;
+#else
+    float offset = surface->offset;
+    int leaves = above > 0.0f;
+#endif
+    *origin = along(surface->position, offset, surface->geometric);
+    return leaves;
+}
+
 #ifdef LIGHT_SAMPLING
-// Makes a shadow ray of the light that was sampled for the path, if the light is on the side of the surface
-// that the path has come to. Returns CLASS_SHADOW where the ray brings something, else 0.
+// Makes a shadow ray of the light that was sampled for the path, if the surface scatters it to the path.
+// Returns CLASS_SHADOW where the ray brings something, else 0.
 INLINE uint light_surface(const Params *params, const State *state, uint path, const Path *p,
-                          const OpaqueBsdf *bsdf, Frame frame, Vec3 wo, Vec3 geometric, Vec3 origin,
+                          const LayeredBsdf *bsdf, Frame frame, Vec3 wo, const Surface *surface,
                           int scatters) {
     LightSample light = load_light_sample(state, path);
-    BsdfValue value = eval_bsdf(bsdf, wo, to_local(frame, light.direction));
-    int lit = scatters & (light.pdf > 0.0f) & (value.pdf > 0.0f) & (dot(geometric, light.direction) > 0.0f);
+    Vec3 wi = to_local(frame, light.direction);
+    BsdfValue value = eval_bsdf(bsdf, wo, wi);
+    Vec3 origin;
+    int leaves = leaves_surface(surface, light.direction, wi, &origin);
+    int lit = scatters & (light.pdf > 0.0f) & (value.pdf > 0.0f) & leaves;
     float pdf = lit ? light.pdf : 1.0f;
     float weight = light_sampling_weight(pdf, value.pdf) / pdf;
     Vec3 arriving = mul(mul(p->throughput, value.f_cos), scale(weight, light.radiance));
@@ -52,6 +72,9 @@ INLINE void shade_path(const Params *params, const Shading *shading, const State
     int mirrors = 0;
 #else
     int mirrors = (material.metallic > 0.0f) | (material.specular > 0.0f);
+#if HAS_TRAIT(CLEARCOAT) && !defined(COAT_NORMALS)
+    mirrors |= material.clearcoat > 0.0f;
+#endif
 #endif
     float facing = orient_surface(&surface, direction, mirrors);
     Vec3 emitted = surface_emission(shading, &surface, &material, facing, p.bsdf_pdf);
@@ -59,24 +82,25 @@ INLINE void shade_path(const Params *params, const Shading *shading, const State
 
     Vec3 wo;
     Frame frame = shading_frame(&surface, direction, &wo);
-    OpaqueBsdf bsdf = bsdf_of(&material, shading->layers + surface.material * LAYER_SIZE, shading->albedos,
-                              params->multiple_scattering);
-    Ray next_ray;
-    next_ray.origin = along(surface.position, surface.offset, surface.geometric);
+    AlbedoTables tables = {shading->layers + surface.material * LAYER_SIZE, shading->albedos,
+                           shading->stretched};
+    LayeredBsdf bsdf =
+        layered_bsdf(&material, tables, params->multiple_scattering, to_local(frame, COAT_NORMAL(&surface)));
     int scatters = p.bounces <= params->max_bounces;
     uint seed = pixel_seed(p.pixel, params->seed);
     Uniform2 choices = uniform_2d(seed, p.sample, PAIR_CHOICE(p.ray));
     uint path_class = 0u;
 #ifdef LIGHT_SAMPLING
-    path_class = light_surface(params, state, path, &p, &bsdf, frame, wo, surface.geometric, next_ray.origin,
-                               scatters);
+    path_class = light_surface(params, state, path, &p, &bsdf, frame, wo, &surface, scatters);
 #endif
 
     // BSDF sampling: the next ray.
     BsdfSample next = sample_bsdf(&bsdf, wo, uniform_2d(seed, p.sample, PAIR_DIRECTION(p.ray)), choices.u);
     Vec3 next_direction = from_local(frame, next.wi);
     Vec3 throughput = mul(p.throughput, next.weight);
-    int goes_on = scatters & (next.pdf > 0.0f) & (dot(surface.geometric, next_direction) > 0.0f);
+    Ray next_ray;
+    int leaves = leaves_surface(&surface, next_direction, next.wi, &next_ray.origin);
+    int goes_on = scatters & (next.pdf > 0.0f) & leaves;
 
     // Russian roulette: a path that carries little may end, and one that survives stands for those that
     // ended.

@@ -62,11 +62,41 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
     media.near = outside | known ? before.entry[0] : surface.material;
     media.far = outside ? entered.entry[0] : left.entry[0];
     int covered = media.near == media.far; // a body of higher priority hides this boundary
+#if HAS_TRAIT(THIN_WALLED)
+    // A wall encloses nothing: the same medium is on both sides.
+    int thin = (shading->materials[surface.material].flags & MATERIAL_THIN_WALLED) != 0u;
+    media.near = thin ? before.entry[0] : media.near;
+    media.far = thin ? before.entry[0] : media.far;
+    covered = thin ? 0 : covered;
+#endif
 
     Vec3 wo;
     Frame frame = shading_frame(&surface, direction, &wo);
     Boundary boundary;
-    boundary.eta = medium_ior(materials, media.far) / medium_ior(materials, media.near);
+    float near_ior = medium_ior(materials, media.near), far_ior = medium_ior(materials, media.far);
+#if HAS_TRAIT(DISPERSION)
+    // Where colours part, the path follows one of them, by chance of what it carries of each.
+    float near_spread = medium_spread(materials, media.near);
+    float far_spread = medium_spread(materials, media.far);
+    int part = (near_spread + far_spread > 0.0f) & (!opaque) & (!covered);
+    float hue = uniform_2d(seed, p.sample, PAIR_CHANNEL(p.ray)).u;
+    float channel = follow_channel(&throughput, hue, part);
+    near_ior += channel * near_spread;
+    far_ior += channel * far_spread;
+#endif
+    boundary.eta = far_ior / near_ior;
+#if HAS_TRAIT(THIN_WALLED)
+    boundary.thin = thin;
+    boundary.eta = thin ? material.ior / near_ior : boundary.eta;
+#endif
+#if HAS_TRAIT(SPECULAR_COLOR)
+    boundary.tint = material.specular_color;
+#endif
+#if HAS_TRAIT(IRIDESCENCE)
+    boundary.iridescence = material.iridescence;
+    boundary.film.ior = material.iridescence_ior;
+    boundary.film.thickness = material.iridescence_thickness;
+#endif
     boundary.alpha = MAX(material.roughness * material.roughness, MIN_ALPHA);
     boundary.specular = material.specular;
     boundary.transmitted = material.base_color;
@@ -77,6 +107,9 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
     int smooth = 1;
 #ifndef SMOOTH_MEDIA
     // Without a step in IOR there is nothing to scatter at, however rough the boundary is.
+    boundary.gain =
+        LERP(1.0f, rough_gain(&boundary, material.roughness, wo.z, shading->glass, shading->albedos),
+             params->multiple_scattering);
     smooth = (material.roughness * material.roughness <= MIN_ALPHA) | (FABS(boundary.eta - 1.0f) < 1e-5f);
 #ifdef LIGHT_SAMPLING
     // Light sampling, where the boundary has a density for it.
@@ -115,6 +148,9 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
 #pragma unroll
     for (uint i = 0u; i < MEDIUM_STACK_SIZE; i++) {
         uint crossed = outside ? entered.entry[i] : left.entry[i];
+#if HAS_TRAIT(THIN_WALLED)
+        crossed = thin ? before.entry[i] : crossed;
+#endif
         after.entry[i] = opaque | reflected ? before.entry[i] : crossed;
     }
     Ray next_ray;

@@ -140,6 +140,8 @@ typedef struct {
     Vec3 position;
     uint object, material, face;
     float weight_b, weight_c; // of the second and third corner; scenes without textures don't keep them
+    float turn;               // with anisotropy: in turns, where reflections are stretched
+    Vec3 coat;                // the normal of a clearcoat, where it is another one than `shading`
 } Surface;
 
 INLINE Surface load_surface(const State *state, uint path) {
@@ -157,6 +159,12 @@ INLINE Surface load_surface(const State *state, uint path) {
     s.weight_b = state->surfaces[SURFACE_WEIGHT_B * stride + path];
     s.weight_c = state->surfaces[SURFACE_WEIGHT_C * stride + path];
 #endif
+#if HAS_TRAIT(ANISOTROPY)
+    s.turn = state->surfaces[SURFACE_TURN * stride + path];
+#endif
+#ifdef COAT_NORMALS
+    s.coat = load3(state->surfaces + SURFACE_COAT_X * stride, stride, path);
+#endif
     return s;
 }
 
@@ -173,6 +181,20 @@ INLINE void store_surface(const State *state, uint path, const Surface *s) {
 #ifdef CORNER_ATTRIBUTES
     state->surfaces[SURFACE_WEIGHT_B * stride + path] = s->weight_b;
     state->surfaces[SURFACE_WEIGHT_C * stride + path] = s->weight_c;
+#endif
+}
+
+// Stores what set_tangents sets up.
+INLINE void store_tangents(const State *state, uint path, const Surface *s) {
+    uint stride = STRIDE(state);
+#if TEXTURED(NORMAL)
+    store3(state->surfaces + SURFACE_SHADING_X * stride, stride, path, s->shading);
+#endif
+#if HAS_TRAIT(ANISOTROPY)
+    state->surfaces[SURFACE_TURN * stride + path] = s->turn;
+#endif
+#ifdef COAT_NORMALS
+    store3(state->surfaces + SURFACE_COAT_X * stride, stride, path, s->coat);
 #endif
 }
 
@@ -213,12 +235,35 @@ INLINE float orient_surface(Surface *surface, Vec3 direction, int mirrors) {
     Vec3 mirroring = mirroring_normal(surface->shading, surface->geometric, scale(-1.0f, direction));
     surface->shading = select(mirrors, mirroring, towards);
 #endif
+#ifdef COAT_NORMALS
+    Vec3 coat = scale(side, surface->coat);
+#ifndef FLAT
+    coat = mirroring_normal(coat, surface->geometric, scale(-1.0f, direction));
+#endif
+    surface->coat = coat;
+#endif
     return facing;
 }
+
+#if HAS_TRAIT(ANISOTROPY)
+// A frame turned about its normal.
+INLINE Frame turned(Frame f, float turns) {
+    float sine, cosine;
+    sincos_turns(turns - FLOOR(turns), &sine, &cosine);
+    Frame frame;
+    frame.tangent = add(scale(cosine, f.tangent), scale(sine, f.bitangent));
+    frame.bitangent = subtract(scale(cosine, f.bitangent), scale(sine, f.tangent));
+    frame.normal = f.normal;
+    return frame;
+}
+#endif
 
 // The frame of an oriented surface, and the way back along the ray in it, which is kept above the surface.
 INLINE Frame shading_frame(const Surface *surface, Vec3 direction, Vec3 *wo) {
     Frame frame = frame_of(surface->shading);
+#if HAS_TRAIT(ANISOTROPY)
+    frame = turned(frame, surface->turn);
+#endif
     *wo = to_local(frame, scale(-1.0f, direction));
     wo->z = MAX(wo->z, 1e-4f);
     return frame;

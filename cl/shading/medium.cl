@@ -1,3 +1,4 @@
+#include "base/features.cl"
 #include "base/scalar.cl"
 
 // The stack of dielectrics that enclose a point: C. M. Schmidt and B. Budge, Simple Nested Dielectrics in
@@ -51,6 +52,28 @@ INLINE float medium_ior(__global const Material *materials, uint medium) {
     float ior = medium_material(materials, medium)->ior;
     return medium == MEDIUM_NONE ? 1.0f : ior;
 }
+
+#if HAS_TRAIT(DISPERSION)
+// How much higher the index of refraction is in blue than in green, and in green than in red.
+INLINE float medium_spread(__global const Material *materials, uint medium) {
+    __global const Material *material = medium_material(materials, medium);
+    // A twentieth of Abbe's number from end to end (KHR_materials_dispersion).
+    float spread = 0.025f * (material->ior - 1.0f) * material->dispersion;
+    return medium == MEDIUM_NONE ? 0.0f : spread;
+}
+
+// Where colours `part`, a path goes on with one of them, chosen by what it carries of each, and carries all
+// of that in it. Returns -1, 0, 1 for red, green, blue, and 0 where they don't part.
+INLINE float follow_channel(Vec3 *throughput, float luck, int part) {
+    float r = throughput->x, g = throughput->y, b = throughput->z;
+    float sum = r + g + b, place = luck * sum;
+    int is_red = (place < r) | (g + b == 0.0f);
+    int is_green = (!is_red) & ((place < r + g) | (b == 0.0f));
+    Vec3 followed = vec3(is_red ? sum : 0.0f, is_green ? sum : 0.0f, is_red | is_green ? 0.0f : sum);
+    *throughput = select(part, followed, *throughput);
+    return part ? (is_red ? -1.0f : (is_green ? 0.0f : 1.0f)) : 0.0f;
+}
+#endif
 
 // What a medium lets through over a distance in metres, which may be infinite (Beer and Lambert). The variant
 // CLEAR_MEDIA serves scenes whose media absorb nothing.

@@ -114,6 +114,8 @@ SHADING = Group(
         _table("materials", "Material", "every material"),
         _table("layers", "float", "of every material the albedo table of its layer, see shading/material.cl"),
         _table("albedos", "float", "the albedo table of all roughnesses, see albedo.rows"),
+        _table("stretched", "float", "that of stretched reflections, see albedo.stretched_rows"),
+        _table("glass", "float", "that of rough glass, see albedo.glass_table"),
         _table("textures", "Texture", "every texture of a material; the first is white"),
         _table("texels", "uint", "the pixels of all bitmaps, see base/texture.cl"),
         _table("byte_values", "float", "what a byte of a pixel stands for, and what one in sRGB does"),

@@ -77,8 +77,24 @@ ALBEDO_TABLE_SIZE = 32
 """Resolution of the specular albedo table in cosine and in roughness (see `albedo.py`)."""
 LAYER_SIZE = ALBEDO_TABLE_SIZE + 4
 """Floats of a material in the table of layers (see `albedo.layer_row`)."""
-ALBEDO_ROW_SIZE = 2 * ALBEDO_TABLE_SIZE + 2
+ALBEDO_ROW_SIZE = 3 * ALBEDO_TABLE_SIZE + 2
 """Floats of a roughness in the table of albedos (see `albedo.rows`)."""
+STRETCHED_ROUGHNESSES, STRETCHED_STEPS, STRETCHED_COSINES = 16, 8, 16
+"""Resolution of the albedo table of stretched reflections: in the roughness across, in how far they are
+stretched, and in the root of the cosine."""
+STRETCHED_ROW_SIZE = 6 * STRETCHED_COSINES + 2
+"""Floats of a roughness and a stretch in that table (see `albedo.stretched_rows`)."""
+GLASS_STEPS = 17
+"""Resolution of the albedo table of rough glass in the step of the index of refraction, in roughness and in
+the root of the cosine (see `albedo.glass_table`); in the middle there is no step."""
+CLEARCOAT_F0 = 0.04
+"""Reflectance of a clearcoat at normal incidence: that of an index of refraction of 1.5."""
+MIN_SHEEN_ALPHA = 0.04
+"""Least width of the sheen distribution, of roughness 0.2: what is narrower only glows at the very edge."""
+SHEEN_NARROW = (25.3245, 3.32435, 0.16801, -1.27393, -4.85967)
+"""Coefficients of the masking of sheen where its distribution is narrow: Estevez and Kulla 2017, table 1."""
+SHEEN_WIDE = (21.5473, 3.82987, 0.19823, -1.97760, -4.32054)
+"""Those where it is wide."""
 LEAST_ALBEDO_LOSS = 1e-3
 """Of light, below which nothing is made of what scatters again: the table of albedos knows no better."""
 ENVIRONMENT_MAX_SIZE = 4096
@@ -121,7 +137,9 @@ class SurfacePlane(IntEnum):
     starts that far along it. It is 0 where there is no such error. FACE counts in the mesh. After `intersect`
     OBJECT is NO_INDEX (as uint) and DISTANCE infinity where the ray left the scene; OBJECT too where it ends
     on a light. WEIGHT_B and WEIGHT_C are the barycentric weights of the second and third corner, for what
-    meshes have at corners; only scenes with textures have them.
+    meshes have at corners; only scenes with textures have them. TURN is the angle, in turns, from the frame
+    that is made of the shading normal alone to the direction along which anisotropic reflections are
+    stretched; COAT_X to COAT_Z the normal of the clearcoat, where that is not the shading normal.
     """
 
     GEOMETRIC_X = 0
@@ -140,6 +158,10 @@ class SurfacePlane(IntEnum):
     FACE = 13
     WEIGHT_B = 14
     WEIGHT_C = 15
+    TURN = 16
+    COAT_X = 17
+    COAT_Y = 18
+    COAT_Z = 19
 
 
 class PathPlane(IntEnum):
@@ -538,6 +560,23 @@ class MaterialFlag(IntFlag):
     TRANSMISSIVE = 2
     CUTOUT = 4
     MASKED = 8
+    THIN_WALLED = 16
+    UNLIT = 32
+
+
+class MaterialTrait(IntEnum):
+    """What a material may have beside base, metal, dielectric layer and body; the feature TRAITS has a bit
+    for each that some material of the scene has, and kernels leave out the others."""
+
+    SPECULAR_COLOR = 0
+    CLEARCOAT = 1
+    SHEEN = 2
+    ANISOTROPY = 3
+    IRIDESCENCE = 4
+    DIFFUSE_TRANSMISSION = 5
+    THIN_WALLED = 6
+    DISPERSION = 7
+    UNLIT = 8
 
 
 class TextureSlot(IntEnum):
@@ -550,6 +589,17 @@ class TextureSlot(IntEnum):
     EMISSION = 3
     TRANSMISSION = 4
     SPECULAR = 5
+    SPECULAR_COLOR = 6
+    CLEARCOAT = 7
+    CLEARCOAT_ROUGHNESS = 8
+    CLEARCOAT_NORMAL = 9
+    SHEEN_COLOR = 10
+    SHEEN_ROUGHNESS = 11
+    ANISOTROPY = 12
+    IRIDESCENCE = 13
+    IRIDESCENCE_THICKNESS = 14
+    DIFFUSE_TRANSMISSION = 15
+    DIFFUSE_TRANSMISSION_COLOR = 16
 
 
 class TextureFlag(IntFlag):
@@ -719,6 +769,22 @@ MATERIAL = _packed(
         ("alpha", np.float32),
         ("alpha_cutoff", np.float32),
         ("normal_scale", np.float32),  # of the deflections of its normal map
+        # The rest of its numbers is read where some material has the trait that they belong to.
+        ("specular_color", np.float32, (3,)),
+        ("clearcoat", np.float32),
+        ("clearcoat_roughness", np.float32),
+        ("clearcoat_normal_scale", np.float32),
+        ("sheen_color", np.float32, (3,)),
+        ("sheen_roughness", np.float32),
+        ("anisotropy", np.float32),
+        ("anisotropy_rotation", np.float32),  # degrees, from the tangent
+        ("iridescence", np.float32),
+        ("iridescence_ior", np.float32),
+        ("iridescence_thickness", np.float32),  # of the film, nm
+        ("iridescence_least_thickness", np.float32),  # where its texture is black, nm
+        ("diffuse_transmission", np.float32),
+        ("diffuse_transmission_color", np.float32, (3,)),
+        ("dispersion", np.float32),
         ("textures", np.uint32, (len(TextureSlot),)),  # rows of TEXTURE; 0 is white
     ]
 )
@@ -808,7 +874,7 @@ PARAMS = _packed(
         ("max_bounces", np.uint32),
         ("transmission_bounces", np.uint32),
         ("roulette_depth", np.uint32),
-        ("multiple_scattering", np.float32),  # 1, or 0: light that scatters again on rough metal is lost
+        ("multiple_scattering", np.float32),  # 1, or 0: light that meets several microfacets is lost
         ("clamp_indirect", np.float32),  # with CLAMP_INDIRECT: see cl/path/clamp.cl
         ("light_count", np.uint32),
         ("environment_probability", np.float32),  # of sampling the environment instead of a triangle
@@ -908,6 +974,8 @@ def c_header() -> str:
     for name, value in named:
         if isinstance(value, Bits):
             lines += _c_bits(name, value)
+        elif isinstance(value, tuple) and all(isinstance(one, float) for one in value):
+            lines += [_c_constant(f"{name}_{i}", one) for i, one in enumerate(value)]
     for enum, prefix in (
         (RayPlane, "RAY"),
         (RawHitPlane, "RAW_HIT"),
@@ -931,6 +999,7 @@ def c_header() -> str:
         (Counter, "COUNTER"),
         (SlotFlag, "SLOT"),
         (MaterialFlag, "MATERIAL"),
+        (MaterialTrait, "TRAIT"),
         (TextureSlot, "SLOT_OF"),
         (TextureFlag, "TEXTURE"),
     ):

@@ -27,8 +27,8 @@ class RenderSettings:
     transmission_bounces  passages through smooth dielectrics, counted apart. Where none are left a path
                           ends, and its light is lost; `StepReport.cut_off` counts these.
     roulette_depth        scattering events before Russian roulette may end a path.
-    multiple_scattering   whether light that meets several microfacets of rough metal goes on; else it is
-                          lost, as in renderers that scatter once.
+    multiple_scattering   whether light that meets several microfacets of rough metal or glass goes on;
+                          else it is lost, as in renderers that scatter once.
     clamp_indirect        the most that a sample adds at once after the first bounce, as the mean of red,
                           green and blue; 0: all. It takes away fireflies and the light that they stand
                           for, so that the picture gets darker than it should be: biased, as in Cycles.

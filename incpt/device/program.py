@@ -45,6 +45,7 @@ FEATURES = {
     "TOP_LEVEL_ONLY": "Every triangle lies in the packs of the top level, in world space.",
     "BRUTE_FORCE": "The triangles of the top level are so few that blocks test them without a tree.",
     "TEXTURES": "With a number: a bit for each TextureSlot that some material has.",
+    "TRAITS": "With a number: a bit for each MaterialTrait that some material has.",
     "CUTOUTS": "Some material covers a share of what is behind it only.",
     "VERTEX_COLORS": "Some mesh has colours at its corners.",
     "AOVS": "Paths write base colour and normal of the first surface into the path buffer.",

@@ -17,7 +17,13 @@ from incpt.core.errors import InputError, InputWarning, in_place, reason_of
 from incpt.core.files import check_readable, read_bytes
 from incpt.formats.gltf_data import GltfData
 from incpt.formats.vertex_attributes import VertexAttributes
-from incpt.scene.material import LARGEST_CUTOFF, LARGEST_SLOPE, Material
+from incpt.scene.material import (
+    LARGEST_CUTOFF,
+    LARGEST_DISPERSION,
+    LARGEST_SLOPE,
+    THICKEST_FILM,
+    Material,
+)
 from incpt.scene.texture import UV_SETS, Texture
 
 MAX_UNSTORED_ITEMS = 100_000_000
@@ -154,8 +160,9 @@ def _matched(data: GltfData, geometries: list[str]) -> dict[str, dict[str, Any]]
 
 
 def _gltf_material(table: dict[str, Any], data: GltfData, label: str) -> Material:
-    """A glTF 2.0 material, and what its KHR extensions ior, specular, transmission, volume and
-    emissive_strength say. Textures whose references are damaged are left out, with an InputWarning."""
+    """A glTF 2.0 material with what its KHR extensions say: anisotropy, clearcoat, diffuse_transmission,
+    dispersion, emissive_strength, ior, iridescence, sheen, specular, transmission, unlit and volume. Textures
+    whose references are damaged are left out, with an InputWarning."""
     surface = table.get("pbrMetallicRoughness", {})
     extensions = table.get("extensions", {})
 
@@ -172,28 +179,67 @@ def _gltf_material(table: dict[str, Any], data: GltfData, label: str) -> Materia
             warnings.warn(f"{text} ({reason_of(error)})", InputWarning, stacklevel=2)
             return None
 
+    def normal_scale(of: dict[str, Any] | None) -> float:
+        return float(np.clip((of or {}).get("scale", 1.0), -LARGEST_SLOPE, LARGEST_SLOPE))
+
+    transmission = factor("transmission", "transmissionFactor", 0.0)
     strength = factor("emissive_strength", "emissiveStrength", 1.0)
     distance = factor("volume", "attenuationDistance", np.inf)
     attenuation = np.clip(factor("volume", "attenuationColor", [1.0, 1.0, 1.0]), 1e-6, 1.0)
-    normal = table.get("normalTexture", {})
     return Material(
         base_color=tuple(surface.get("baseColorFactor", [1.0, 1.0, 1.0])[:3]),
         metallic=surface.get("metallicFactor", 1.0),
         roughness=surface.get("roughnessFactor", 1.0),
         specular=factor("specular", "specularFactor", 1.0),
         ior=factor("ior", "ior", 1.5),
-        transmission=factor("transmission", "transmissionFactor", 0.0),
+        transmission=transmission,
+        thin_walled=transmission > 0 and not factor("volume", "thicknessFactor", 0.0) > 0,
+        dispersion=min(factor("dispersion", "dispersion", 0.0), LARGEST_DISPERSION),
+        specular_color=tuple(factor("specular", "specularColorFactor", [1.0, 1.0, 1.0])),
+        clearcoat=factor("clearcoat", "clearcoatFactor", 0.0),
+        clearcoat_roughness=factor("clearcoat", "clearcoatRoughnessFactor", 0.0),
+        clearcoat_normal_scale=normal_scale(factor("clearcoat", "clearcoatNormalTexture", None)),
+        sheen_color=tuple(factor("sheen", "sheenColorFactor", [0.0, 0.0, 0.0])),
+        sheen_roughness=factor("sheen", "sheenRoughnessFactor", 0.0),
+        anisotropy=factor("anisotropy", "anisotropyStrength", 0.0),
+        anisotropy_rotation=float(np.degrees(factor("anisotropy", "anisotropyRotation", 0.0))),
+        iridescence=factor("iridescence", "iridescenceFactor", 0.0),
+        iridescence_ior=factor("iridescence", "iridescenceIor", 1.3),
+        iridescence_thickness=min(factor("iridescence", "iridescenceThicknessMaximum", 400.0), THICKEST_FILM),
+        iridescence_least_thickness=min(
+            factor("iridescence", "iridescenceThicknessMinimum", 100.0), THICKEST_FILM
+        ),
+        diffuse_transmission=factor("diffuse_transmission", "diffuseTransmissionFactor", 0.0),
+        diffuse_transmission_color=tuple(
+            factor("diffuse_transmission", "diffuseTransmissionColorFactor", [1.0, 1.0, 1.0])
+        ),
+        unlit="KHR_materials_unlit" in extensions,
         absorption=tuple((-np.log(attenuation) / distance).tolist()),
         emission=tuple(float(e) * strength for e in table.get("emissiveFactor", [0.0, 0.0, 0.0])),
         double_sided=table.get("doubleSided", False),
         alpha=surface.get("baseColorFactor", [1.0, 1.0, 1.0, 1.0])[3],
         alpha_mode=str(table.get("alphaMode", "OPAQUE")).lower(),
         alpha_cutoff=min(table.get("alphaCutoff", 0.5), LARGEST_CUTOFF),
-        normal_scale=float(np.clip(normal.get("scale", 1.0), -LARGEST_SLOPE, LARGEST_SLOPE)),
+        normal_scale=normal_scale(table.get("normalTexture")),
         base_color_texture=texture(surface.get("baseColorTexture")),
         metallic_roughness_texture=texture(surface.get("metallicRoughnessTexture")),
         normal_texture=texture(table.get("normalTexture")),
         emission_texture=texture(table.get("emissiveTexture")),
         transmission_texture=texture(factor("transmission", "transmissionTexture", None)),
         specular_texture=texture(factor("specular", "specularTexture", None)),
+        specular_color_texture=texture(factor("specular", "specularColorTexture", None)),
+        clearcoat_texture=texture(factor("clearcoat", "clearcoatTexture", None)),
+        clearcoat_roughness_texture=texture(factor("clearcoat", "clearcoatRoughnessTexture", None)),
+        clearcoat_normal_texture=texture(factor("clearcoat", "clearcoatNormalTexture", None)),
+        sheen_color_texture=texture(factor("sheen", "sheenColorTexture", None)),
+        sheen_roughness_texture=texture(factor("sheen", "sheenRoughnessTexture", None)),
+        anisotropy_texture=texture(factor("anisotropy", "anisotropyTexture", None)),
+        iridescence_texture=texture(factor("iridescence", "iridescenceTexture", None)),
+        iridescence_thickness_texture=texture(factor("iridescence", "iridescenceThicknessTexture", None)),
+        diffuse_transmission_texture=texture(
+            factor("diffuse_transmission", "diffuseTransmissionTexture", None)
+        ),
+        diffuse_transmission_color_texture=texture(
+            factor("diffuse_transmission", "diffuseTransmissionColorTexture", None)
+        ),
     )

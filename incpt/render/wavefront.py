@@ -43,7 +43,8 @@ _CLASSES = {path_list: PathClass[path_list.name] for path_list in PathList}
 _SHAPED, _TREE, _CLAMP = "SHAPED_LIGHTS", "LIGHT_TREE", "CLAMP_INDIRECT"
 _LIGHTS = ("ENVIRONMENT_IMAGE", "SUN", "TRIANGLE_LIGHTS", _SHAPED, _TREE)
 _TEXTURES = ("TEXTURES", "VERTEX_COLORS")
-_TRACED = (*_TEXTURES, "CUTOUTS")
+_MATERIALS = (*_TEXTURES, "TRAITS")
+_TRACED = (*_MATERIALS, "CUTOUTS")
 """Of first hits, which pass through lights."""
 _FEATURES: Mapping[str | None, tuple[str, ...]] = {
     "generate": ("LENS",),
@@ -52,11 +53,11 @@ _FEATURES: Mapping[str | None, tuple[str, ...]] = {
     "choose_lights": _LIGHTS,
     "sample_lights": (*_LIGHTS, *_TEXTURES),
     "touch_lights": (*_LIGHTS, *_TEXTURES),
-    "shade_medium": (*_LIGHTS, *_TEXTURES, _CLAMP),
-    "shade": (*_LIGHTS, *_TEXTURES, _CLAMP),
-    "write_aovs": _TEXTURES,
-    "first_hits": _TEXTURES,
-    "trace_shadow": (*_TRACED, _SHAPED, _TREE),
+    "shade_medium": (*_LIGHTS, *_MATERIALS, _CLAMP),
+    "shade": (*_LIGHTS, *_MATERIALS, _CLAMP),
+    "write_aovs": _MATERIALS,
+    "first_hits": _MATERIALS,
+    "trace_shadow": (*_TEXTURES, "CUTOUTS", _SHAPED, _TREE),
 }
 """The features of a scene without which a kernel would leave something out. Those that would only make it
 quicker, as they do blocks, would be more variants to build."""
@@ -214,7 +215,7 @@ class Wavefront:
 
     def _first_hits(self, chunk: _Chunk, surface: cl.Buffer, object_ids: cl.Buffer) -> None:
         pixels = int(chunk.params["width"]) * int(chunk.params["height"])
-        features = _chosen(chunk.batch.features, _TEXTURES)
+        features = _chosen(chunk.batch.features, _FEATURES["first_hits"])
         values = {"pixels": pixels, "first_surface": surface, "object_ids": object_ids}
         self._launch("first_hits", chunk, chunk.size, features, **values)
 
@@ -278,7 +279,7 @@ def _launches_of(features: tuple[str, ...]) -> tuple[_StageLaunch, ...]:
 def _features_of(stage: Stage, features: tuple[str, ...]) -> tuple[str, ...]:
     """Those that choose the variant of the stage's kernel."""
     if When.ENDS in stage.when:
-        return ("EMISSION_ONLY", *_chosen(features, (*_TEXTURES, _CLAMP)))
+        return ("EMISSION_ONLY", *_chosen(features, (*_MATERIALS, _CLAMP)))
     names = _FEATURES.get(stage.kernel, ())
     if stage.kernel == "intersect" and _SHAPED not in features:
         names = _TRACED

@@ -20,7 +20,7 @@ def transparent_bodies_around(scene: Scene, point: Vector) -> list[Object]:
         obj
         for obj in scene.objects
         if obj.visible
-        and scene.material(obj.material).transmission > 0
+        and scene.material(obj.material).is_body
         and has_in_bounds(obj, point)
         and _encloses(obj, point)
     ]

@@ -8,7 +8,7 @@ from types import NoneType
 from incpt.core.affine import Vector
 from incpt.core.checks import one_of, require, require_bool, whole
 from incpt.core.layout import TextureSlot
-from incpt.scene.checks import set_number, set_vector
+from incpt.scene.checks import LARGEST, set_number, set_vector
 from incpt.scene.texture import Texture
 
 ALPHA_MODES = ("opaque", "mask", "blend")
@@ -17,11 +17,21 @@ LARGEST_CUTOFF = 1000.0
 """Of `alpha_cutoff`. Above 1 nothing is covered."""
 LARGEST_SLOPE = 100.0
 """Of `normal_scale`; below 0 bumps are dents."""
+THICKEST_FILM = 100_000.0
+"""Of `iridescence_thickness`, nm; from a few thousand on a film has no colours any more."""
+LARGEST_DISPERSION = 100.0
+"""Of `dispersion`; diamond has 0.36, and from 20 on it is far beyond what there is."""
+_SHARES = (
+    "metallic", "roughness", "specular", "transmission", "alpha", "clearcoat", "clearcoat_roughness",
+    "sheen_roughness", "anisotropy", "iridescence", "diffuse_transmission",
+)  # fmt: skip
+"""Parameters from 0 to 1."""
 
 
 @dataclass(frozen=True)
 class Material:
-    """Terms and ranges follow glTF 2.0; the equations stand in `cl/shading/material.cl`.
+    """Terms and ranges follow glTF 2.0 and its ratified extensions (KHR_materials_*); the equations stand in
+    `cl/shading/material.cl` and `layers.cl`.
 
     GGX alpha is `roughness` squared. `absorption` is per metre inside a transmissive body, `priority`
     orders nested dielectrics (the higher wins, 0 is the highest of all), `emission` is radiance, from
@@ -32,11 +42,29 @@ class Material:
     `alpha_cutoff` and nothing elsewhere; "opaque" takes no notice of it. What covers in part is no light for
     light sampling. A ray goes through 256 such surfaces at most (`layout.MOST_LAYERS`); the next covers all.
 
-    Numbers are multiplied with what their textures say at a point: `base_color_texture` and
-    `emission_texture` by colours in sRGB (where their bitmaps are bytes or 16-bit numbers),
-    `metallic_roughness_texture` by blue and green, `transmission_texture` by red, `specular_texture` by
-    alpha. `normal_texture` bends the shading normal: red and green, from 0 to 1, are its deflections along
-    the tangent and upwards in the image, from -1 to 1 and times `normal_scale`.
+    From the bottom up: metal or a diffuse base, which lets `diffuse_transmission` of its light through to the
+    other side, in `diffuse_transmission_color`; on it the reflection of `ior`, `specular` and
+    `specular_color`, of metal that of `base_color`, stretched along the tangent by `anisotropy` (turned by
+    `anisotropy_rotation` degrees, counter-clockwise) and in the colours of a film of `iridescence_ior` and
+    `iridescence_thickness` nm as far as `iridescence` says; then `sheen_color`, the fuzz of cloth; then
+    `clearcoat`, a colourless lacquer with an index of refraction of 1.5. Each lets through what it does not
+    reflect. Sheen, clearcoat, anisotropy and film belong to what is not transmissive.
+
+    Where a material is transmissive it is a body, which absorbs and refracts, or with `thin_walled` a wall
+    without a thickness, which does neither: light goes straight on behind it. `dispersion` is 20 over Abbe's
+    number: from red to blue the index of refraction grows by (ior - 1) dispersion / 20. `unlit` surfaces
+    shine with their base colour as radiance, on both sides, and reflect nothing; they light others, but light
+    sampling does not look for them.
+
+    Numbers are multiplied with what their textures say at a point: those of colours by colours in sRGB (where
+    their bitmaps are bytes or 16-bit numbers), `metallic_roughness_texture` by blue and green,
+    `transmission`, `clearcoat` and `iridescence` by red, `clearcoat_roughness` by green, `specular`,
+    `sheen_roughness` and `diffuse_transmission` by alpha, `anisotropy` by blue, where red and green are the
+    direction. Green of `iridescence_thickness_texture` leads from `iridescence_least_thickness` to
+    `iridescence_thickness`.
+    `normal_texture` bends the shading normal: red and green, from 0 to 1, are its deflections along the
+    tangent and upwards in the image, from -1 to 1 and times `normal_scale`; `clearcoat_normal_texture` that
+    of the clearcoat, which is smooth without it.
     """
 
     base_color: Vector = (0.8, 0.8, 0.8)
@@ -53,26 +81,63 @@ class Material:
     alpha_mode: str = "opaque"
     alpha_cutoff: float = 0.5
     normal_scale: float = 1.0
+    specular_color: Vector = (1.0, 1.0, 1.0)
+    clearcoat: float = 0.0
+    clearcoat_roughness: float = 0.0
+    clearcoat_normal_scale: float = 1.0
+    sheen_color: Vector = (0.0, 0.0, 0.0)
+    sheen_roughness: float = 0.0
+    anisotropy: float = 0.0
+    anisotropy_rotation: float = 0.0
+    iridescence: float = 0.0
+    iridescence_ior: float = 1.3
+    iridescence_thickness: float = 400.0
+    iridescence_least_thickness: float = 100.0
+    diffuse_transmission: float = 0.0
+    diffuse_transmission_color: Vector = (1.0, 1.0, 1.0)
+    thin_walled: bool = False
+    dispersion: float = 0.0
+    unlit: bool = False
     base_color_texture: Texture | None = None
     metallic_roughness_texture: Texture | None = None
     normal_texture: Texture | None = None
     emission_texture: Texture | None = None
     transmission_texture: Texture | None = None
     specular_texture: Texture | None = None
+    specular_color_texture: Texture | None = None
+    clearcoat_texture: Texture | None = None
+    clearcoat_roughness_texture: Texture | None = None
+    clearcoat_normal_texture: Texture | None = None
+    sheen_color_texture: Texture | None = None
+    sheen_roughness_texture: Texture | None = None
+    anisotropy_texture: Texture | None = None
+    iridescence_texture: Texture | None = None
+    iridescence_thickness_texture: Texture | None = None
+    diffuse_transmission_texture: Texture | None = None
+    diffuse_transmission_color_texture: Texture | None = None
 
     def __post_init__(self) -> None:
         set_vector(self, "base_color", low=0.0, high=1.0)
-        for name in ("metallic", "roughness", "specular", "transmission"):
+        for name in _SHARES:
             set_number(self, name, 0.0, 1.0)
         set_number(self, "ior", 1.0, 100.0)
         set_vector(self, "absorption", low=0.0)
         set_vector(self, "emission", low=0.0)
         object.__setattr__(self, "priority", whole("priority", self.priority, 0, 1000))
-        require_bool("double_sided", self.double_sided)
-        set_number(self, "alpha", 0.0, 1.0)
+        for name in ("double_sided", "thin_walled", "unlit"):
+            require_bool(name, getattr(self, name))
         set_number(self, "alpha_cutoff", 0.0, LARGEST_CUTOFF)
         one_of("alpha_mode", self.alpha_mode, ALPHA_MODES)
-        set_number(self, "normal_scale", -LARGEST_SLOPE, LARGEST_SLOPE)
+        for name in ("normal_scale", "clearcoat_normal_scale"):
+            set_number(self, name, -LARGEST_SLOPE, LARGEST_SLOPE)
+        set_vector(self, "specular_color", low=0.0)
+        set_vector(self, "sheen_color", low=0.0, high=1.0)
+        set_vector(self, "diffuse_transmission_color", low=0.0, high=1.0)
+        set_number(self, "anisotropy_rotation", -LARGEST, LARGEST)
+        set_number(self, "iridescence_ior", 1.0, 100.0)
+        for name in ("iridescence_thickness", "iridescence_least_thickness"):
+            set_number(self, name, 0.0, THICKEST_FILM)
+        set_number(self, "dispersion", 0.0, LARGEST_DISPERSION)
         for slot in TextureSlot:
             name = texture_name(slot)
             require(name, getattr(self, name), (Texture, NoneType), "a Texture")
@@ -84,7 +149,18 @@ class Material:
 
     @property
     def is_emissive(self) -> bool:
-        return any(c > 0 for c in self.emission)
+        """Whether light sampling may find it."""
+        return any(c > 0 for c in self.emission) and not self.unlit
+
+    @property
+    def is_transmissive(self) -> bool:
+        """Whether it lets light through without scattering it."""
+        return self.transmission > 0 and not self.unlit
+
+    @property
+    def is_body(self) -> bool:
+        """Whether what it encloses is a medium, with an index of refraction and absorption."""
+        return self.is_transmissive and not self.thin_walled
 
 
 _TEXTURE_NAMES = {slot: f"{slot.name.lower()}_texture" for slot in TextureSlot}

@@ -25,7 +25,8 @@ def scene_problems(scene: Scene) -> list[str]:
     is_bright = picture is None or bool(picture.pixels.any()) or scene.environment.has_sun
     lit = any(c > 0 for c in scene.environment.radiance) and is_bright
     lit = lit or any(light.is_emissive for light in scene.lights)
-    if not lit and not any(o.visible and scene.materials[o.material].is_emissive for o in scene.objects):
+    shining = (scene.materials[o.material] for o in scene.objects if o.visible)
+    if not lit and not any(material.is_emissive or material.unlit for material in shining):
         problems.append(
             "the scene has no light: the picture will be black; "
             "add a light, an environment or an emissive material"

@@ -55,16 +55,20 @@ def attribute_table(
     pool: GeometryPool, scene: Scene, meshes: Mapping[Mesh, PooledMesh], has_textures: bool
 ) -> AttributeTable:
     """Of a scene whose meshes are held. What they have at their corners is uploaded where `has_textures`, or
-    some have colours, and tangents are computed where normal maps need them. Raises DeviceError where there
-    is no room for it."""
-    is_used = has_textures or any(mesh.colors is not None for mesh in meshes)
+    some have colours, and tangents are computed where normal maps or stretched reflections need them. Raises
+    DeviceError where there is no room for it."""
+    is_used = (
+        has_textures
+        or any(mesh.colors is not None for mesh in meshes)
+        or any(material.anisotropy > 0 for material in scene.materials.values())
+    )
     if is_used:
         pool.hold_corners(_needed(scene, meshes), meshes)
     return AttributeTable(pool, scene, meshes, is_used)
 
 
 def _needed(scene: Scene, meshes: Iterable[Mesh]) -> dict[tuple[Mesh, str], None]:
-    """What meshes have at their corners, and the tangents of those that normal maps lie on."""
+    """What meshes have at their corners, and the tangents of those whose materials need them."""
     needed: dict[tuple[Mesh, str], None] = {}
     for mesh in meshes:
         needed |= dict.fromkeys((mesh, f"uvs {number}") for number in range(len(mesh.uvs)))
@@ -76,12 +80,15 @@ def _needed(scene: Scene, meshes: Iterable[Mesh]) -> dict[tuple[Mesh, str], None
 
 
 def _tangent_sets(materials: Mapping[str, Material]) -> dict[str, int]:
-    """The set of texture coordinates by which the normal map of each material goes that has one."""
-    return {
-        name: material.normal_texture.uv_set
-        for name, material in materials.items()
-        if material.normal_texture is not None
-    }
+    """The set of texture coordinates by which the tangents of each material go that needs them: for a normal
+    map, for that of its clearcoat, or because its reflections are stretched along them."""
+    found = {}
+    for name, material in materials.items():
+        maps = (material.normal_texture, material.clearcoat_normal_texture, material.anisotropy_texture)
+        texture = next((one for one in maps if one is not None), None)
+        if texture is not None or material.anisotropy > 0:
+            found[name] = texture.uv_set if texture is not None else 0
+    return found
 
 
 def _describe(row: np.void, mesh: PooledMesh, tangent_set: int | None) -> None:

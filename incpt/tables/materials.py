@@ -9,20 +9,30 @@ import numpy as np
 import pyopencl as cl
 
 from incpt.core import layout
+from incpt.core.layout import MaterialTrait
 from incpt.device.device import Device
 from incpt.scene.material import Material
 from incpt.tables import albedo
 from incpt.tables.textures import TextureTables
 
-_COPIED = ("base_color", "metallic", "emission", "roughness", "absorption", "specular", "ior", "transmission",
-           "priority", "alpha", "alpha_cutoff", "normal_scale")  # fmt: skip
+_COPIED = (
+    "base_color", "metallic", "emission", "roughness", "absorption", "specular", "ior", "transmission",
+    "priority", "alpha", "alpha_cutoff", "normal_scale", "specular_color", "clearcoat",
+    "clearcoat_roughness", "clearcoat_normal_scale", "sheen_color", "sheen_roughness", "anisotropy",
+    "anisotropy_rotation", "iridescence", "iridescence_ior", "iridescence_thickness",
+    "iridescence_least_thickness", "diffuse_transmission", "diffuse_transmission_color", "dispersion",
+)  # fmt: skip
 """What rows take over from materials as it is."""
+
+_NOT_OF_LAYERS = 1 << MaterialTrait.THIN_WALLED | 1 << MaterialTrait.DISPERSION | 1 << MaterialTrait.UNLIT
+"""Traits that leave opaque surfaces as they are."""
 
 
 @dataclass(frozen=True, eq=False)
 class MaterialTables:
     """The buffers, by name, and what all materials have in common.
 
+    traits           bits of MaterialTrait that some material has
     has_media        whether any lets light through
     is_matte         whether no surface that may be shaded as opaque has a specular layer or is metallic
     is_media_clear   whether none that lets light through absorbs any of it
@@ -31,11 +41,31 @@ class MaterialTables:
     """
 
     buffers: Mapping[str, cl.Buffer]
+    traits: int
     has_media: bool
     is_matte: bool
     is_media_clear: bool
     is_media_smooth: bool
     has_cutouts: bool
+
+
+def traits_of(material: Material) -> set[MaterialTrait]:
+    """What the kernels must know to shade it beside base, metal, dielectric layer and body."""
+    if material.unlit:
+        return {MaterialTrait.UNLIT}
+    mirrors = material.specular > 0 or material.metallic > 0
+    has_color = material.specular_color != (1.0, 1.0, 1.0) or material.specular_color_texture is not None
+    has = {
+        MaterialTrait.SPECULAR_COLOR: has_color and material.specular > 0 and material.metallic < 1,
+        MaterialTrait.CLEARCOAT: material.clearcoat > 0,
+        MaterialTrait.SHEEN: any(c > 0 for c in material.sheen_color),
+        MaterialTrait.ANISOTROPY: material.anisotropy > 0 and mirrors,
+        MaterialTrait.IRIDESCENCE: material.iridescence > 0 and mirrors,
+        MaterialTrait.DIFFUSE_TRANSMISSION: material.diffuse_transmission > 0,
+        MaterialTrait.THIN_WALLED: material.is_transmissive and material.thin_walled,
+        MaterialTrait.DISPERSION: material.is_body and material.dispersion > 0,
+    }
+    return {trait for trait, holds in has.items() if holds}
 
 
 def material_tables(
@@ -56,21 +86,34 @@ def material_tables(
         # What covers in part is left to the rays that meet it, also where it is a lamp in the other scene.
         row["light_pdf"] = 0.0 if material.is_cutout else densities.get(name, 0.0)
         row["flags"] = (
-            flags.DOUBLE_SIDED * material.double_sided
-            | flags.TRANSMISSIVE * (material.transmission > 0)
+            flags.DOUBLE_SIDED * (material.double_sided or material.unlit)
+            | flags.TRANSMISSIVE * material.is_transmissive
+            | flags.THIN_WALLED * material.thin_walled
+            | flags.UNLIT * material.unlit
             | flags.CUTOUT * material.is_cutout
             | flags.MASKED * (material.alpha_mode == "mask")
         )
         row["textures"] = textures.numbers_of(material)
         layer[:] = albedo.layer_row(material)
-    media = [material for material in materials.values() if material.transmission > 0]
+    media = [material for material in materials.values() if material.is_transmissive]
     # Of a material that lets all light through no opaque surface is ever shaded.
     opaque = [material for material in materials.values() if material.transmission < 1]
+    traits = sum(1 << trait for trait in set().union(*map(traits_of, materials.values())))
+    is_media_smooth = all(material.roughness**2 <= layout.MIN_ALPHA for material in media)
+    unused = np.zeros(1, np.float32)
+    is_stretched = bool(traits >> MaterialTrait.ANISOTROPY & 1)
     return MaterialTables(
-        {"materials": device.upload(rows), "layers": device.upload(layers)},
+        {
+            "materials": device.upload(rows),
+            "layers": device.upload(layers),
+            "stretched": device.upload(albedo.stretched_rows() if is_stretched else unused),
+            "glass": device.upload(unused if is_media_smooth else albedo.glass_table()),
+        },
+        traits=traits,
         has_media=bool(media),
-        is_matte=all(material.specular == material.metallic == 0 for material in opaque),
+        is_matte=all(material.unlit or material.specular == material.metallic == 0 for material in opaque)
+        and traits & ~_NOT_OF_LAYERS == 0,
         is_media_clear=not any(any(material.absorption) for material in media),
-        is_media_smooth=all(material.roughness**2 <= layout.MIN_ALPHA for material in media),
+        is_media_smooth=is_media_smooth,
         has_cutouts=any(material.is_cutout for material in materials.values()),
     )

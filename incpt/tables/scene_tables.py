@@ -105,8 +105,9 @@ class SceneTables:
             or self.scene.camera.has_lens
             or self.scene.camera.near > 0,
         }
-        textures = (f"TEXTURES {self.textures.slots}u",) if self.textures.slots else ()
-        return (*self.features, *textures, *(name for name, holds in names.items() if holds))
+        numbers = {"TEXTURES": self.textures.slots, "TRAITS": materials.traits}
+        numbered = (f"{name} {bits}u" for name, bits in numbers.items() if bits)
+        return (*self.features, *numbered, *(name for name, holds in names.items() if holds))
 
     @property
     def has_media(self) -> bool:

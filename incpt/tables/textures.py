@@ -20,7 +20,10 @@ from incpt.tables import albedo, texels
 from incpt.tables.range_buffer import Range, RangeBuffer
 
 _MOST_WORDS = layout.NO_INDEX
-_COLORS = (TextureSlot.BASE_COLOR, TextureSlot.EMISSION)
+_COLORS = (
+    TextureSlot.BASE_COLOR, TextureSlot.EMISSION, TextureSlot.SPECULAR_COLOR, TextureSlot.SHEEN_COLOR,
+    TextureSlot.DIFFUSE_TRANSMISSION_COLOR,
+)  # fmt: skip
 """Slots that read colours, which are in sRGB where pixels are whole numbers."""
 _WHITE = Bitmap(np.full((1, 1, 4), 255, np.uint8), BitmapSource())
 

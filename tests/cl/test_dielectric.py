@@ -15,7 +15,7 @@ ANGLES_DEG = (0.0, 30.0, 60.0, 82.0)
 Array = npt.NDArray[np.floating]
 
 _BOUNDARY = """Boundary b; b.eta = p[0]; b.alpha = p[1]; b.specular = p[2];
-    b.transmitted = vec3(1.0f, 1.0f, 1.0f); Vec3 wo = vec3(ox[i], oy[i], oz[i]); """
+    b.gain = 1.0f; b.transmitted = vec3(1.0f, 1.0f, 1.0f); Vec3 wo = vec3(ox[i], oy[i], oz[i]); """
 
 
 def _components(prefix: str, w: Array, count: int) -> dict[str, npt.NDArray[np.float32]]:

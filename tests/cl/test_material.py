@@ -1,4 +1,4 @@
-"""The opaque surface of cl/shading/material.cl: its samples, its symmetry, and its energy."""
+"""The opaque surface of cl/shading/material.cl and layers.cl: its samples, its symmetry, and its energy."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from support.kernels import SIGNIFICANCE, call, device, direction, direction_p_v
 from support.parameters import NAMES, unlike_default
 
 from incpt.core import layout
+from incpt.core.layout import MaterialTrait
 from incpt.scene.material import Material
 from incpt.tables import albedo
-from incpt.tables.materials import material_tables
+from incpt.tables.materials import material_tables, traits_of
 from incpt.tables.textures import texture_tables
 
 COUNT = 1 << 16
@@ -32,17 +33,48 @@ MATERIALS = {
     "metal": Material((0.9, 0.6, 0.3), metallic=1.0, roughness=0.4),
     "rough metal": Material((1, 1, 1), metallic=1.0, roughness=1.0),
     "half metal": Material((0.9, 0.6, 0.3), metallic=0.5, roughness=0.7),
-}
+    "gold layer": Material((0.2, 0.3, 0.8), roughness=0.4, specular_color=(4.0, 1.5, 0.3)),
+    "lacquer": Material((0.7, 0.1, 0.1), roughness=0.8, clearcoat=1.0, clearcoat_roughness=0.3),
+    "lacquered metal": Material(
+        (0.9, 0.6, 0.3), metallic=1.0, roughness=0.5, clearcoat=0.6, clearcoat_roughness=0.4
+    ),
+    "velvet": Material((0.3, 0.02, 0.05), roughness=1.0, sheen_color=(0.9, 0.3, 0.4), sheen_roughness=0.4),
+    "lacquered cloth": Material(
+        (0.5, 0.5, 0.5), sheen_color=(1, 1, 1), sheen_roughness=0.7, clearcoat=0.5, clearcoat_roughness=0.3
+    ),
+    "brushed metal": Material((0.9, 0.6, 0.3), metallic=1.0, roughness=0.4, anisotropy=0.7),
+    "brushed plastic": Material((0.3, 0.6, 0.8), roughness=0.5, anisotropy=1.0),
+    "oil": Material((0.2, 0.2, 0.2), roughness=0.3, iridescence=1.0, iridescence_thickness=450.0),
+    "anodised": Material((0.8, 0.8, 0.9), metallic=1.0, roughness=0.4, iridescence=0.7, iridescence_ior=1.8),
+    "leaf": Material(
+        (0.2, 0.5, 0.1), roughness=0.5, diffuse_transmission=0.6, diffuse_transmission_color=(0.6, 0.8, 0.1)
+    ),
+    "all": Material(
+        (0.6, 0.3, 0.2), metallic=0.4, roughness=0.4, specular_color=(1, 0.5, 0.2), clearcoat=0.5,
+        clearcoat_roughness=0.3, sheen_color=(0.4, 0.5, 0.6), sheen_roughness=0.5, anisotropy=0.5,
+        iridescence=0.5, diffuse_transmission=0.5, diffuse_transmission_color=(0.2, 0.6, 0.9),
+    ),
+}  # fmt: skip
+TRANSMITTING = [name for name, material in MATERIALS.items() if material.diffuse_transmission > 0]
 ANGLES_DEG = (0.0, 35.0, 70.0, 86.0)
 
 _SURFACE = """SurfaceMaterial m = plain_material(material);
-    OpaqueBsdf s = bsdf_of(&m, layer, albedos, multiple[0]); Vec3 wo = vec3(ox[i], oy[i], oz[i]);"""
+    AlbedoTables tables = {layer, albedos, stretched};
+    LayeredBsdf s = layered_bsdf(&m, tables, multiple[0], vec3(0.0f, 0.0f, 1.0f));
+    Vec3 wo = vec3(ox[i], oy[i], oz[i]);"""
 
 
 def _arguments(material: Material, multiple: float = 1.0) -> dict[str, npt.NDArray[np.generic]]:
     values = {k: v for k, v in asdict(material).items() if k in (layout.MATERIAL.names or ())}
     return {"material": struct_rows(layout.MATERIAL, [values]), "layer": albedo.layer_row(material),
-            "albedos": albedo.rows(), "multiple": np.float32([multiple])}  # fmt: skip
+            "albedos": albedo.rows(), "stretched": albedo.stretched_rows(),
+            "multiple": np.float32([multiple])}  # fmt: skip
+
+
+def trait_features(material: Material) -> tuple[str, ...]:
+    """The feature by which kernels know what the material has."""
+    bits = sum(1 << trait for trait in traits_of(material))
+    return (f"TRAITS {bits}u",) if bits else ()
 
 
 def _components(prefix: str, w: Array, count: int) -> dict[str, npt.NDArray[np.float32]]:
@@ -51,29 +83,32 @@ def _components(prefix: str, w: Array, count: int) -> dict[str, npt.NDArray[np.f
 
 
 def evaluate(
-    material: Material, wo: Array, wi: Array, features: tuple[str, ...] = (), multiple: float = 1.0
+    material: Material, wo: Array, wi: Array, features: tuple[str, ...] | None = None, multiple: float = 1.0
 ) -> tuple[Array, Array]:
-    """f cos (3, N) and pdf (N,) for directions (3,) or (3, N)."""
+    """f cos (3, N) and pdf (N,) for directions (3,) or (3, N), by the kernels of what the material has or of
+    `features`."""
     count = max(np.reshape(wo, (3, -1)).shape[1], np.reshape(wi, (3, -1)).shape[1])
+    features = trait_features(material) if features is None else features
     body = _SURFACE + """BsdfValue b = eval_bsdf(&s, wo, vec3(ix[i], iy[i], iz[i]));
         r[i] = b.f_cos.x; g[i] = b.f_cos.y; b_[i] = b.f_cos.z; pdf[i] = b.pdf;"""  # fmt: skip
     r, g, b, pdf = call(
-        "material", body, count, ("r", "g", "b_", "pdf"), features, **_components("o", wo, count),
+        "layers", body, count, ("r", "g", "b_", "pdf"), features, **_components("o", wo, count),
         **_components("i", wi, count), **_arguments(material, multiple),
     )  # fmt: skip
     return np.stack([r, g, b]), pdf
 
 
 def sample(
-    material: Material, wo: Array, count: int, seed: int = 11, features: tuple[str, ...] = ()
+    material: Material, wo: Array, count: int, seed: int = 11, features: tuple[str, ...] | None = None
 ) -> tuple[Array, Array, Array]:
     """wi (3, N), weight (3, N), pdf (N,)."""
     u, v, lobe = uniforms(count, 3, seed)
+    features = trait_features(material) if features is None else features
     body = _SURFACE + """Uniform2 uv; uv.u = u[i]; uv.v = v[i];
         BsdfSample b = sample_bsdf(&s, wo, uv, lobe[i]); x[i] = b.wi.x; y[i] = b.wi.y; z[i] = b.wi.z;
         r[i] = b.weight.x; g[i] = b.weight.y; b_[i] = b.weight.z; pdf[i] = b.pdf;"""  # fmt: skip
     results = call(
-        "material", body, count, ("x", "y", "z", "r", "g", "b_", "pdf"), features,
+        "layers", body, count, ("x", "y", "z", "r", "g", "b_", "pdf"), features,
         **_components("o", wo, count), u=u, v=v, lobe=lobe, **_arguments(material),
     )  # fmt: skip
     return np.stack(results[:3]), np.stack(results[3:6]), results[6]
@@ -107,7 +142,7 @@ def test_a_sample_weighs_its_value_over_its_density(name: str) -> None:
         np.testing.assert_allclose(weight[:, valid], value[:, valid] / density[valid], rtol=2e-3, atol=1e-6)
         assert (weight[:, ~valid] == 0).all()
         np.testing.assert_allclose(np.linalg.norm(wi, axis=0), 1, atol=1e-5)
-        assert (wi[2, valid] > 0).all()
+        assert (wi[2, valid] > 0).all() or name in TRANSMITTING
 
 
 @pytest.mark.parametrize("name", MATERIALS)
@@ -126,10 +161,24 @@ def test_reciprocity(name: str) -> None:
 
 def test_nothing_below_the_surface() -> None:
     wi = direction(np.linspace(np.pi / 2 + 1e-3, np.pi, 100), 1.0)
-    for material in MATERIALS.values():
+    for name, material in MATERIALS.items():
         for wo, w in ((wo_at(30), wi), (-wo_at(30), wi), (wi, wo_at(30)[:, None])):
             value, pdf = evaluate(material, wo, w)
-            assert (value == 0).all() and (pdf == 0).all()
+            if name in TRANSMITTING and wo is not wi and wo[2] > 0:
+                assert (value > 0).all() and (pdf > 0).all()
+            else:
+                assert (value == 0).all() and (pdf == 0).all()
+
+
+@pytest.mark.parametrize("name", TRANSMITTING)
+def test_reciprocity_through_the_surface(name: str) -> None:
+    """Seen from the other side the surface is the same, so that a ray back is one with both turned over."""
+    z, phi, y, psi = (a.astype(np.float64) for a in uniforms(5000, 4, 14))
+    wo = direction(np.arccos(z * 0.98 + 0.02), 6.3 * phi)
+    wi = direction(np.arccos(-y * 0.98 - 0.02), 6.3 * psi)
+    forward = evaluate(MATERIALS[name], wo, wi)[0] / -wi[2]
+    backward = evaluate(MATERIALS[name], wi * [[1], [1], [-1]], wo * [[1], [1], [-1]])[0] / wo[2]
+    np.testing.assert_allclose(forward, backward, rtol=1e-3, atol=1e-6)
 
 
 def reflected_share(material: Material, angle_deg: float, count: int = COUNT) -> Array:
@@ -254,6 +303,52 @@ def test_no_material_reflects_more_than_arrives() -> None:
         assert integral(material, float(88 * rng.random())).max() < 1.01
 
 
+ALL_TRAITS = (f"TRAITS {sum(1 << trait for trait in MaterialTrait)}u",)
+"""The feature of scenes in which every trait is there."""
+
+
+def random_white(rng: np.random.Generator) -> Material:
+    """A material that absorbs nothing, with everything else at random, and each trait in half of them."""
+
+    def some(high: float = 1.0) -> float:
+        return float(high * rng.random() * (rng.random() < 0.5))
+
+    return Material(
+        (1, 1, 1), metallic=some(), roughness=float(0.1 + 0.9 * rng.random()), specular=float(rng.random()),
+        ior=float(1 + 2 * rng.random()), specular_color=tuple((3 * rng.random(3) ** 2).tolist()),
+        clearcoat=some(), clearcoat_roughness=float(0.1 + 0.9 * rng.random()),
+        sheen_color=(some(), some(), some()), sheen_roughness=float(rng.random()), anisotropy=some(),
+        iridescence=some(), iridescence_ior=float(1 + rng.random()),
+        iridescence_thickness=float(1200 * rng.random()), diffuse_transmission=some(),
+    )  # fmt: skip
+
+
+def test_no_layered_material_makes_light() -> None:
+    """Also at grazing angles, and whatever is combined; what it takes stays within what layers hide."""
+    rng = np.random.default_rng(17)
+    least = 1.0
+    for _ in range(150):
+        material, angle = random_white(rng), float(89 * rng.random())
+        wi_count = 1 << 13
+        weight = sample(material, wo_at(angle), wi_count, features=ALL_TRAITS)[1].astype(np.float64)
+        share, error = weight.mean(axis=1), weight.std(axis=1) / np.sqrt(wi_count)
+        assert (share < 1.01 + 4 * error).all(), (material, angle, share)
+        least = min(least, float(share.max()))
+    assert least > 0.6
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+def test_variant_for_all_traits_is_the_same(name: str) -> None:
+    """What a material does not have makes no difference where another one of the scene has it."""
+    material = MATERIALS[name]
+    u, v = uniforms(4096, 2, 6)
+    wi = direction(np.arccos(1 - 2 * u), 2 * np.pi * v)
+    for angle in ANGLES_DEG:
+        wo = wo_at(angle)
+        own, all_ = evaluate(material, wo, wi), evaluate(material, wo, wi, ALL_TRAITS)
+        np.testing.assert_allclose(all_[0], own[0], rtol=0.03, atol=2e-4)
+
+
 @pytest.mark.parametrize("angle_deg", [*ANGLES_DEG, 100.0])
 @pytest.mark.parametrize("name", ["lambert", "white lambert"])
 def test_variant_for_matte_scenes_is_the_same(name: str, angle_deg: float) -> None:
@@ -279,7 +374,7 @@ def test_scenes_are_matte_where_the_variant_makes_no_difference(name: str) -> No
     wi = direction(np.radians([[10.0], [40.0], [80.0]]), np.arange(0.0, 6.0)).reshape(3, -1)
     general, variant = (
         [np.vstack(evaluate(material, wo_at(angle), wi, features)) for angle in ANGLES_DEG]
-        for features in ((), ("MATTE",))
+        for features in (None, ("MATTE",))
     )
     is_same = np.allclose(variant, general, rtol=1e-5, atol=1e-7)
     textures = texture_tables(device(), {"one": material})

@@ -12,9 +12,11 @@ import numpy.typing as npt
 import pytest
 
 from incpt.core.errors import InputError, InputWarning
+from incpt.core.layout import TextureSlot
 from incpt.formats import bitmaps, mesh_files, scene_save
 from incpt.formats.mesh_scene import scene_around
 from incpt.formats.registry import load
+from incpt.scene.material import texture_of
 from incpt.scene.mesh_part import MeshPart
 from incpt.scene.texture import Bitmap
 
@@ -173,6 +175,75 @@ def test_all_slots_and_how_they_are_read(tmp_path: Path) -> None:
     assert mesh.colors is not None and mesh.tangents is not None
     np.testing.assert_allclose(mesh.colors, np.broadcast_to([1, 0, 0.2, 1], (2, 3, 4)), atol=1e-6)
     np.testing.assert_array_equal(mesh.tangents, np.broadcast_to([1, 0, 0, -1], (2, 3, 4)))
+
+
+_LAYERS = {
+    "anisotropy": {"anisotropyStrength": 0.6, "anisotropyRotation": np.pi / 2, "anisotropyTexture": 0},
+    "clearcoat": {
+        "clearcoatFactor": 0.7, "clearcoatRoughnessFactor": 0.2, "clearcoatTexture": 0,
+        "clearcoatRoughnessTexture": 0, "clearcoatNormalTexture": 0,
+    },
+    "diffuse_transmission": {
+        "diffuseTransmissionFactor": 0.3, "diffuseTransmissionColorFactor": [0.1, 0.2, 0.3],
+        "diffuseTransmissionTexture": 0, "diffuseTransmissionColorTexture": 0,
+    },
+    "dispersion": {"dispersion": 0.4},
+    "iridescence": {
+        "iridescenceFactor": 0.8, "iridescenceIor": 1.4, "iridescenceThicknessMinimum": 150,
+        "iridescenceThicknessMaximum": 350, "iridescenceTexture": 0, "iridescenceThicknessTexture": 0,
+    },
+    "sheen": {
+        "sheenColorFactor": [0.4, 0.5, 0.6], "sheenRoughnessFactor": 0.3, "sheenColorTexture": 0,
+        "sheenRoughnessTexture": 0,
+    },
+    "specular": {"specularColorFactor": [2, 1, 0.5], "specularColorTexture": 0},
+    "transmission": {"transmissionFactor": 0.9},
+    "unlit": {},
+    "volume": {"thicknessFactor": 0.0},
+}  # fmt: skip
+"""What extensions of materials say; a texture is the number of one."""
+_LAYERS_READ = {
+    "anisotropy": 0.6, "anisotropy_rotation": 90.0, "clearcoat": 0.7, "clearcoat_roughness": 0.2,
+    "clearcoat_normal_scale": 0.25, "diffuse_transmission": 0.3,
+    "diffuse_transmission_color": (0.1, 0.2, 0.3), "dispersion": 0.4, "iridescence": 0.8,
+    "iridescence_ior": 1.4, "iridescence_least_thickness": 150.0, "iridescence_thickness": 350.0,
+    "sheen_color": (0.4, 0.5, 0.6), "sheen_roughness": 0.3, "specular_color": (2.0, 1.0, 0.5),
+    "transmission": 0.9, "unlit": True, "thin_walled": True,
+}  # fmt: skip
+
+
+def test_every_extension_of_materials_is_read(tmp_path: Path) -> None:
+    (tmp_path / "made.png").write_bytes(png(tmp_path))
+    writer = Writer()
+    writer.more = {"images": [{"uri": "made.png"}], "textures": [{"source": 0}]}
+    extensions = {
+        f"KHR_materials_{name}": {
+            key: {"index": value, "scale": 0.25} if key.endswith("Texture") else value
+            for key, value in table.items()
+        }
+        for name, table in _LAYERS.items()
+    }
+    material = {"name": "all", "extensions": extensions}
+    made = only_part(writer.write_gltf(tmp_path / "all.gltf", {}, material)).material
+    assert made is not None
+    for name, value in _LAYERS_READ.items():
+        assert getattr(made, name) == pytest.approx(value), name
+    asked = sum(key.endswith("Texture") for table in _LAYERS.values() for key in table)
+    assert asked == sum(texture_of(made, slot) is not None for slot in TextureSlot)
+
+
+@pytest.mark.parametrize(
+    ("transmission", "thickness", "is_thin"), [(1, 0, True), (1, 0.5, False), (0, 0, False)]
+)
+def test_the_thickness_of_a_volume_decides_between_wall_and_body(
+    tmp_path: Path, transmission: float, thickness: float, is_thin: bool
+) -> None:
+    extensions = {
+        "KHR_materials_transmission": {"transmissionFactor": transmission},
+        "KHR_materials_volume": {"thicknessFactor": thickness, "attenuationDistance": 2.0},
+    }
+    made = only_part(Writer().write_gltf(tmp_path / "a.gltf", {}, {"extensions": extensions})).material
+    assert made is not None and made.thin_walled is is_thin
 
 
 def test_placements_turn_tangents_too(tmp_path: Path) -> None:

@@ -196,6 +196,18 @@ def test_weights_of_large_lights(
     assert session.image().mean() == pytest.approx(images[0].mean(), rel=0.005)
 
 
+def test_what_passes_through_a_sheet_is_lit_from_behind(trees: Callable[[bool], None]) -> None:
+    """Lights below a leaf count as those above it do: with its normal they would have the least chance."""
+    leaf = Material((0.5, 0.5, 0.5), specular=0, diffuse_transmission=0.5)
+    noise = []
+    scene = replace(wall_of_lights(1.0, 0.0), materials={"floor": leaf})
+    for wanted in (False, True):
+        trees(wanted)
+        noise.append(repeat(replace(scene), 64, max_bounces=0))
+    assert_same_mean(*noise, relative=0.005)
+    assert noise[1].var(axis=0).mean() < 1.2 * noise[0].var(axis=0).mean()
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_schedules_agree(name: str, device: Device, trees: Callable[[bool], None]) -> None:
     if not traces_in_blocks(device):

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from incpt.core.layout import MaterialTrait
 from incpt.device.device import Device
 from incpt.formats.edit_script import load_edits
 from incpt.formats.registry import load
@@ -19,12 +20,13 @@ from incpt.scene.change import diff
 from incpt.scene.light import KINDS
 from incpt.scene.model import Scene
 from incpt.scenes import make_city, make_many_lamps
+from incpt.tables.materials import traits_of
 
 FOLDER = Path(str(resources.files("incpt.scenes")))
 NAMES = (
-    *("editing", "nested_dielectrics", "cornell", "mis", "bunny", "city", "textured", "lamps", "many_lamps"),
-    "cameras",
-)
+    "editing", "nested_dielectrics", "cornell", "mis", "bunny", "city", "textured", "lamps", "many_lamps",
+    "cameras", "materials",
+)  # fmt: skip
 FLOOR_TOLERANCE = 0.01
 """Metres that an object may stand above or in its floor."""
 
@@ -181,6 +183,11 @@ def test_many_lamps_are_what_their_script_makes(tmp_path: Path, scenes: dict[str
     assert [light.name for light in new.lights] == [light.name for light in old.lights]
     places = [[light.position for light in scene.lights] for scene in (new, old)]
     np.testing.assert_allclose(*places, rtol=2e-3, atol=1e-6)
+
+
+def test_materials_has_every_trait(scenes: dict[str, Scene]) -> None:
+    shown = set().union(*map(traits_of, scenes["materials"].materials.values()))
+    assert shown == set(MaterialTrait) - {MaterialTrait.SPECULAR_COLOR, MaterialTrait.UNLIT}
 
 
 def test_city_is_large(scenes: dict[str, Scene]) -> None:

@@ -11,7 +11,10 @@ from incpt.core.errors import InputError
 from incpt.core.layout import MATERIAL
 from incpt.scene.material import Material
 
-DERIVED = {"double_sided": "flags", "alpha_mode": "flags", **dict.fromkeys(TEXTURES, "textures")}
+DERIVED = {
+    **dict.fromkeys(("double_sided", "alpha_mode", "thin_walled", "unlit"), "flags"),
+    **dict.fromkeys(TEXTURES, "textures"),
+}
 """Parameters that kernels see in another form, and the field of the struct that holds it."""
 
 
@@ -20,8 +23,8 @@ DERIVED = {"double_sided": "flags", "alpha_mode": "flags", **dict.fromkeys(TEXTU
 def test_every_parameter_is_checked(name: str, value: Any) -> None:
     if value is None and name in TEXTURES:
         return  # no texture
-    if name == "normal_scale" and value == -1.0:
-        return  # dents for bumps
+    if name in ("normal_scale", "clearcoat_normal_scale", "anisotropy_rotation") and value == -1.0:
+        return  # dents for bumps, and angles
     with pytest.raises(InputError, match=f"^{name}: "):
         Material(**{name: value})
 

@@ -214,6 +214,46 @@ def lights() -> Scene:
     return Scene(camera, Environment(), materials, objects, lights=lamps)
 
 
+def panes() -> Scene:
+    """Thin walls, clear and tinted, between a lamp and a matte corner."""
+    materials = {
+        "wall": matte(0.6, 0.6, 0.6), "block": matte(0.7, 0.4, 0.2), "lamp": lamp(6, 5, 4),
+        "clear": Material((1, 1, 1), roughness=0, transmission=1, thin_walled=True),
+        "tinted": Material((0.9, 0.5, 0.3), roughness=0, transmission=1, thin_walled=True, ior=1.8),
+    }  # fmt: skip
+    objects = (
+        plane("floor", "wall", (0, 0, 0), (0, 0, 0), (6, 1, 6)),
+        plane("back", "wall", (0, 1.5, -1.5), (90, 0, 0), (6, 1, 3)),
+        plane("lamp", "lamp", (0.5, 2.4, 0.3), (180, 0, 0), (1.4, 1, 1.4)),
+        cube("block", "block", (-0.2, 0.35, -0.5), (0, 25, 0), (0.5, 0.7, 0.5)),
+        plane("clear", "clear", (-0.7, 0.6, 0.4), (70, 10, 0), (1, 1, 1.2)),
+        plane("tinted", "tinted", (0.7, 0.6, 0.2), (80, -30, 10), (0.9, 1, 1)),
+        Object("bubble", shape("sphere"), "clear", (0.4, 0.3, 0.9), scale=(0.5, 0.5, 0.5)),
+    )
+    sky = Environment(color=(0.3, 0.35, 0.4))
+    return Scene(Camera((0, 1.2, 3.6), (0, 0.5, 0), fov_y=38), sky, materials, objects)
+
+
+def brushed() -> Scene:
+    """Metal with stretched reflections, along and across, flat and round, that mirrors a lamp and a sky."""
+    along = Material((1, 1, 1), metallic=1, roughness=0.3, anisotropy=0.4)
+    materials = {
+        "floor": matte(0.4, 0.4, 0.4), "lamp": lamp(8, 7, 6), "along": along,
+        "across": replace(along, anisotropy_rotation=90),
+        "much": replace(along, roughness=0.2, anisotropy=0.5),
+    }  # fmt: skip
+    objects = (
+        plane("floor", "floor", (0, 0, 0), (0, 0, 0), (6, 1, 6)),
+        plane("lamp", "lamp", (0.3, 2.2, -1.6), (125, 0, 0), (1, 1, 1)),
+        plane("along", "along", (-0.9, 0.5, 0), (25, 20, 0), (0.9, 1, 0.9)),
+        plane("across", "across", (0.1, 0.5, 0), (25, 0, 0), (0.9, 1, 0.9)),
+        Object("round", shape("cylinder"), "much", (1.1, 0.5, 0), (0, 30, 10), (0.8, 1, 0.8)),
+    )
+    image = load_image(_ROOT / "scenes" / "courtyard.exr")
+    sky = Environment((1, 1, 1), image, rotation_y=40, intensity=0.6)
+    return Scene(Camera((0, 1.3, 3.6), (0, 0.5, 0), fov_y=38), sky, materials, objects)
+
+
 def lens() -> Scene:
     """The box behind a lens that is wide open, of which a plane between the blocks is sharp."""
     return cornell().with_camera(f_stop=0.12, focus_distance=3.6, focal_length=30.0, sensor_fit="vertical")
@@ -240,6 +280,8 @@ REFERENCES = {
     "textured": Reference(textured, 3),
     "embossed": Reference(embossed, 3),
     "lights": Reference(lights, 3),
+    "panes": Reference(panes, 20),
+    "brushed": Reference(brushed, 3),
     "lens": Reference(lens, 3),
     "orthographic": Reference(orthographic, 3),
     "shifted": Reference(shifted, 3),

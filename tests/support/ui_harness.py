@@ -39,7 +39,7 @@ from incpt.viewer.renderer import Message, Renderer
 from incpt.viewer.view import Frame, Picture, View
 from support.null_renderer import NullRenderer
 
-WINDOW = (1600, 2300)
+WINDOW = (1600, 3400)
 """Tall enough that no panel has to be scrolled."""
 SECONDS_PER_FRAME = 1 / 60
 

@@ -10,14 +10,15 @@ import pytest
 from support.parameters import NAMES, TEXTURES, unlike_default
 
 from incpt.core import layout
-from incpt.core.layout import MaterialFlag
+from incpt.core.layout import MaterialFlag, MaterialTrait
 from incpt.device.device import Device
 from incpt.scene.material import Material
 from incpt.tables.materials import MaterialTables, material_tables
 from incpt.tables.textures import texture_tables
 
 IN_FLAGS = {"double_sided": MaterialFlag.DOUBLE_SIDED, "transmission": MaterialFlag.TRANSMISSIVE,
-            "alpha_mode": MaterialFlag.CUTOUT}  # fmt: skip
+            "alpha_mode": MaterialFlag.CUTOUT, "thin_walled": MaterialFlag.THIN_WALLED,
+            "unlit": MaterialFlag.UNLIT | MaterialFlag.DOUBLE_SIDED}  # fmt: skip
 """Parameters that set a flag, `transmission` beside its own field."""
 
 
@@ -68,7 +69,7 @@ def test_layers_follow_what_their_albedo_depends_on(device: Device) -> None:
     for name in NAMES:
         made = tables(device, Material(), Material(**{name: unlike_default(name)}))
         is_other = not np.array_equal(layer(device, made, 0), layer(device, made, 1))
-        assert is_other == (name in ("roughness", "specular", "ior", "metallic")), name
+        assert is_other == (name in ("roughness", "specular", "specular_color", "ior", "metallic")), name
 
 
 def test_there_is_a_row_without_any_material(device: Device) -> None:
@@ -93,6 +94,11 @@ MATTE, GLASS = Material(specular=0.0), Material(transmission=1.0, roughness=0.0)
         ((MATTE, Material(transmission=0.999)), False),
         ((MATTE, Material(transmission=0.999, specular=0.0)), True),
         ((MATTE, Material(transmission=0.999, specular=0.0, metallic=1.0)), False),
+        ((MATTE, Material(specular=0.0, clearcoat=0.1)), False),
+        ((MATTE, Material(specular=0.0, diffuse_transmission=0.1)), False),
+        ((MATTE, Material(specular=0.0, anisotropy=0.5)), True),
+        ((MATTE, Material(unlit=True, clearcoat=1.0)), True),
+        ((MATTE, Material(transmission=1.0, thin_walled=True, dispersion=1.0)), True),
     ],
 )
 def test_scenes_are_matte_where_no_opaque_surface_has_a_layer_or_is_metallic(
@@ -115,3 +121,21 @@ def test_what_all_media_have_in_common(
 ) -> None:
     made = tables(device, *materials)
     assert (made.has_media, made.is_media_clear, made.is_media_smooth) == (has_media, is_clear, is_smooth)
+
+
+@pytest.mark.parametrize("trait", MaterialTrait)
+def test_traits_are_those_of_some_material(device: Device, trait: MaterialTrait) -> None:
+    values: dict[MaterialTrait, dict[str, Any]] = {
+        MaterialTrait.SPECULAR_COLOR: {"specular_color": (1, 0.5, 1)},
+        MaterialTrait.CLEARCOAT: {"clearcoat": 0.1},
+        MaterialTrait.SHEEN: {"sheen_color": (0, 0.1, 0)},
+        MaterialTrait.ANISOTROPY: {"anisotropy": 0.1},
+        MaterialTrait.IRIDESCENCE: {"iridescence": 0.1},
+        MaterialTrait.DIFFUSE_TRANSMISSION: {"diffuse_transmission": 0.1},
+        MaterialTrait.THIN_WALLED: {"thin_walled": True, "transmission": 0.5},
+        MaterialTrait.DISPERSION: {"dispersion": 0.1, "transmission": 0.5},
+        MaterialTrait.UNLIT: {"unlit": True, "transmission": 1.0},
+    }
+    made = tables(device, MATTE, Material(**values[trait]))
+    assert made.traits == 1 << trait and tables(device, MATTE, Material()).traits == 0
+    assert made.has_media == (trait in (MaterialTrait.THIN_WALLED, MaterialTrait.DISPERSION))

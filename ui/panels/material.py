@@ -46,10 +46,90 @@ def draw(material: Material, refusals: Refusals) -> Material:
     material = _draw_share(
         material, refusals, "specular", "Specular", "Dielectric layer; 0 is exactly Lambertian"
     )
+    tint = widgets.color("Specular tint", material.specular_color, tip="Colour of the dielectric layer")
+    material = refusals.changed(material, specular_color=tint)
     ior = widgets.number("IOR", material.ior, low=1.0, high=4.0, speed=0.005, tip="Index of refraction")
     material = refusals.changed(material, ior=ior)
-    material = _draw_transmission(_draw_alpha(material, refusals), refusals)
-    return _draw_emission(material, refusals)
+    for part in _PARTS:
+        material = part(material, refusals)
+    return material
+
+
+def _draw_clearcoat(material: Material, refusals: Refusals) -> Material:
+    with widgets.section("Clearcoat", material.clearcoat > 0) as is_open:
+        if not is_open:
+            return material
+        material = _draw_share(material, refusals, "clearcoat", "Clearcoat", "A colourless lacquer on all")
+        return _draw_share(
+            material, refusals, "clearcoat_roughness", "Coat roughness", "GGX alpha: its square"
+        )
+
+
+def _draw_sheen(material: Material, refusals: Refusals) -> Material:
+    with widgets.section("Sheen", any(material.sheen_color)) as is_open:
+        if not is_open:
+            return material
+        color = widgets.color("Sheen", material.sheen_color, tip="Fuzz of cloth; black: none. Linear RGB")
+        material = refusals.changed(material, sheen_color=color)
+        return _draw_share(material, refusals, "sheen_roughness", "Sheen rough", "Low: at the edges only")
+
+
+def _draw_anisotropy(material: Material, refusals: Refusals) -> Material:
+    with widgets.section("Anisotropy", material.anisotropy > 0) as is_open:
+        if not is_open:
+            return material
+        material = _draw_share(material, refusals, "anisotropy", "Anisotropy", "How far reflections stretch")
+        turn = widgets.number(
+            "Direction", material.anisotropy_rotation, speed=0.5, unit="°", tip="From the tangent, along u"
+        )
+        return refusals.changed(material, anisotropy_rotation=turn)
+
+
+def _draw_iridescence(material: Material, refusals: Refusals) -> Material:
+    with widgets.section("Iridescence", material.iridescence > 0) as is_open:
+        if not is_open:
+            return material
+        material = _draw_share(
+            material, refusals, "iridescence", "Iridescence", "Share that a thin film covers"
+        )
+        ior = widgets.number(
+            "Film IOR", material.iridescence_ior, low=1.0, high=4.0, speed=0.005, tip="Of the film"
+        )
+        material = refusals.changed(material, iridescence_ior=ior)
+        for name, label in (
+            ("iridescence_thickness", "Thickness"),
+            ("iridescence_least_thickness", "Least thickness"),
+        ):
+            value = widgets.number(
+                label,
+                getattr(material, name),
+                low=0.0,
+                high=2000.0,
+                speed=2.0,
+                unit=" nm",
+                tip=_FILM_TIPS[name],
+            )
+            material = refusals.changed(material, **{name: value})
+        return material
+
+
+def _draw_translucency(material: Material, refusals: Refusals) -> Material:
+    with widgets.section("Translucency", material.diffuse_transmission > 0) as is_open:
+        if not is_open:
+            return material
+        material = _draw_share(
+            material,
+            refusals,
+            "diffuse_transmission",
+            "Translucency",
+            "Diffuse light that goes through: leaves",
+        )
+        color = widgets.color(
+            "Through colour",
+            material.diffuse_transmission_color,
+            tip="Colour of what goes through. Linear RGB",
+        )
+        return refusals.changed(material, diffuse_transmission_color=color)
 
 
 def _draw_alpha(material: Material, refusals: Refusals) -> Material:
@@ -72,6 +152,14 @@ def _draw_transmission(material: Material, refusals: Refusals) -> Material:
         if not is_open:
             return material
         material = _draw_share(material, refusals, "transmission", "Transmission", "1: glass")
+        is_thin = widgets.checkbox(
+            "Thin walled", material.thin_walled, "A wall without thickness, not a body"
+        )
+        material = refusals.changed(material, thin_walled=is_thin)
+        dispersion = widgets.number(
+            "Dispersion", material.dispersion, low=0.0, high=5.0, speed=0.01, tip="20 / Abbe's number"
+        )
+        material = refusals.changed(material, dispersion=dispersion)
         absorption = widgets.vector(
             "Absorption",
             material.absorption,
@@ -93,16 +181,29 @@ def _draw_transmission(material: Material, refusals: Refusals) -> Material:
 
 
 def _draw_emission(material: Material, refusals: Refusals) -> Material:
-    with widgets.section("Emission", material.is_emissive) as is_open:
+    with widgets.section("Emission", any(material.emission) or material.unlit) as is_open:
         if not is_open:
             return material
         emission = widgets.radiance("Emission", material.emission, tip="Radiance: colour times strength")
         material = refusals.changed(material, emission=emission)
         is_double = widgets.checkbox("Double sided", material.double_sided, "Emission from the back too")
-        return refusals.changed(material, double_sided=is_double)
+        material = refusals.changed(material, double_sided=is_double)
+        is_unlit = widgets.checkbox("Unlit", material.unlit, "Shines with its base colour, reflects nothing")
+        return refusals.changed(material, unlit=is_unlit)
 
 
 def _draw_share(material: Material, refusals: Refusals, name: str, label: str, tip: str) -> Material:
     """A parameter between 0 and 1."""
     value = widgets.number(label, getattr(material, name), low=0.0, high=1.0, speed=0.005, tip=tip)
     return refusals.changed(material, **{name: value})
+
+
+_PARTS = (
+    _draw_alpha, _draw_transmission, _draw_translucency, _draw_clearcoat, _draw_sheen, _draw_anisotropy,
+    _draw_iridescence, _draw_emission,
+)  # fmt: skip
+"""The sections, from the top."""
+_FILM_TIPS = {
+    "iridescence_thickness": "Of the film; where its map is white",
+    "iridescence_least_thickness": "Where the film's map is black",
+}

@@ -18,7 +18,31 @@ _LABELS = {
     TextureSlot.EMISSION: ("Emission map", "Times the emission, which is black at first"),
     TextureSlot.TRANSMISSION: ("Transmission map", "Red times transmission"),
     TextureSlot.SPECULAR: ("Specular map", "Alpha times specular"),
+    TextureSlot.SPECULAR_COLOR: ("Specular tint map", "Times the specular tint"),
+    TextureSlot.CLEARCOAT: ("Clearcoat map", "Red times clearcoat"),
+    TextureSlot.CLEARCOAT_ROUGHNESS: ("Coat rough map", "Green times the clearcoat's roughness"),
+    TextureSlot.CLEARCOAT_NORMAL: ("Coat normal map", "Bends the clearcoat's normal; smooth without it"),
+    TextureSlot.SHEEN_COLOR: ("Sheen map", "Times the sheen colour"),
+    TextureSlot.SHEEN_ROUGHNESS: ("Sheen rough map", "Alpha times the sheen's roughness"),
+    TextureSlot.ANISOTROPY: ("Anisotropy map", "Blue times anisotropy; red and green are its direction"),
+    TextureSlot.IRIDESCENCE: ("Iridescence map", "Red times iridescence"),
+    TextureSlot.IRIDESCENCE_THICKNESS: ("Film map", "Green: from the least thickness to the thickness"),
+    TextureSlot.DIFFUSE_TRANSMISSION: ("Translucency map", "Alpha times the translucency"),
+    TextureSlot.DIFFUSE_TRANSMISSION_COLOR: ("Transl. colour map", "Times the translucency's colour"),
 }
+_OF_PART = {
+    TextureSlot.CLEARCOAT: "clearcoat",
+    TextureSlot.CLEARCOAT_ROUGHNESS: "clearcoat",
+    TextureSlot.CLEARCOAT_NORMAL: "clearcoat",
+    TextureSlot.SHEEN_COLOR: "sheen_color",
+    TextureSlot.SHEEN_ROUGHNESS: "sheen_color",
+    TextureSlot.ANISOTROPY: "anisotropy",
+    TextureSlot.IRIDESCENCE: "iridescence",
+    TextureSlot.IRIDESCENCE_THICKNESS: "iridescence",
+    TextureSlot.DIFFUSE_TRANSMISSION: "diffuse_transmission",
+    TextureSlot.DIFFUSE_TRANSMISSION_COLOR: "diffuse_transmission",
+}
+"""The parameter without which a slot has nothing to act on, and no row."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +61,8 @@ def draw(material: Material, refusals: Refusals) -> tuple[Material, TextureReque
             return material, request
         for slot, (label, tip) in _LABELS.items():
             texture, name = texture_of(material, slot), texture_name(slot)
+            if texture is None and not _is_shown(material, slot):
+                continue
             with widgets.row(label, tip):
                 if widgets.button(f"Choose…##{name}", "An image file"):
                     request = TextureRequest(slot)
@@ -46,15 +72,20 @@ def draw(material: Material, refusals: Refusals) -> tuple[Material, TextureReque
             if texture is not None:
                 widgets.value_row("   File", _described(texture), tip)
             if slot is TextureSlot.NORMAL:
-                material = _draw_strength(material, refusals)
+                material = _draw_strength(material, refusals, "normal_scale", "Normal strength")
+            if slot is TextureSlot.CLEARCOAT_NORMAL and texture is not None:
+                material = _draw_strength(material, refusals, "clearcoat_normal_scale", "Coat strength")
         return material, request
 
 
-def _draw_strength(material: Material, refusals: Refusals) -> Material:
-    strength = widgets.number(
-        "Normal strength", material.normal_scale, high=4.0, tip="Times the slopes of the normal map"
-    )
-    return refusals.changed(material, normal_scale=strength)
+def _is_shown(material: Material, slot: TextureSlot) -> bool:
+    value = getattr(material, _OF_PART[slot]) if slot in _OF_PART else True
+    return any(value) if isinstance(value, tuple) else bool(value)
+
+
+def _draw_strength(material: Material, refusals: Refusals, name: str, label: str) -> Material:
+    strength = widgets.number(label, getattr(material, name), high=4.0, tip="Times the slopes of the map")
+    return refusals.changed(material, **{name: strength})
 
 
 def _described(texture: Texture) -> str:

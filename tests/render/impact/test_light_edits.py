@@ -21,6 +21,7 @@ from incpt.render.blocks import traces_in_blocks
 from incpt.render.modes import Mode
 from incpt.render.session import Session
 from incpt.scene.change import diff
+from incpt.scene.edits import unique_name
 from incpt.scene.light import Light
 from incpt.scene.model import Scene
 from incpt.tables.geometry_pool import GeometryPool
@@ -211,7 +212,8 @@ light_edits = st.builds(
     changes,
 )
 comings = st.builds(
-    lambda at: lambda s: s.with_added_light(replace(NEW, name=f"new {len(s.lights)}", position=at)), places
+    lambda at: lambda s: s.with_added_light(replace(NEW, name=unique_name("new", s.names), position=at)),
+    places,
 )
 goings = st.builds(
     lambda name: lambda s: s.without_light(name) if name in s.light_index else s,

@@ -24,8 +24,10 @@ from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
 from incpt.viewer.renderer import Pin, Restart
 
 SCENE = mixed_scene(size=(48, 32), strategy="spiral").with_material(
-    "red", normal_texture=A_TEXTURE, alpha_mode="mask"
-)
+    "red", normal_texture=A_TEXTURE, clearcoat_normal_texture=A_TEXTURE, alpha_mode="mask", clearcoat=0.5,
+    sheen_color=(0.5, 0.5, 0.5), anisotropy=0.5, iridescence=0.5, diffuse_transmission=0.5,
+    clearcoat_roughness=0.5,
+)  # fmt: skip
 LENS = SCENE.with_camera(focal_length=35.0, f_stop=2.8, focus_distance=2.0, blades=5, near=0.1)
 TALL = LENS.with_camera(sensor_fit="vertical")
 PARALLEL = SCENE.with_camera(projection="orthographic").with_camera("top", position=(0, 9, 0.1))
@@ -86,6 +88,21 @@ FIELDS = [
     Field("Object", "Alpha", "scene.materials.red.alpha", "0.25", 0.25, dragged=-30),
     Field("Object", "Cutoff", "scene.materials.red.alpha_cutoff", "0.25", 0.25),
     Field("Object", "Normal strength", "scene.materials.red.normal_scale", "0.5", 0.5),
+    Field("Object", "Coat strength", "scene.materials.red.clearcoat_normal_scale", "0.5", 0.5),
+    *colour("Object", "Specular tint", "scene.materials.red.specular_color"),
+    Field("Object", "Clearcoat", "scene.materials.red.clearcoat", "0.25", 0.25),
+    Field("Object", "Coat roughness", "scene.materials.red.clearcoat_roughness", "0.25", 0.25),
+    *colour("Object", "Sheen", "scene.materials.red.sheen_color"),
+    Field("Object", "Sheen rough", "scene.materials.red.sheen_roughness", "0.25", 0.25),
+    Field("Object", "Anisotropy", "scene.materials.red.anisotropy", "0.25", 0.25),
+    Field("Object", "Direction", "scene.materials.red.anisotropy_rotation", "45", 45),
+    Field("Object", "Iridescence", "scene.materials.red.iridescence", "0.25", 0.25),
+    Field("Object", "Film IOR", "scene.materials.red.iridescence_ior", "1.5", 1.5),
+    Field("Object", "Thickness", "scene.materials.red.iridescence_thickness", "250", 250),
+    Field("Object", "Least thickness", "scene.materials.red.iridescence_least_thickness", "50", 50),
+    Field("Object", "Translucency", "scene.materials.red.diffuse_transmission", "0.25", 0.25),
+    *colour("Object", "Through colour", "scene.materials.red.diffuse_transmission_color"),
+    Field("Object", "Dispersion", "scene.materials.glass.dispersion", "0.5", 0.5, BALL),
     *vector("Scene", "Camera", "scene.camera.position"),
     *vector("Scene", "Target", "scene.camera.target"),
     Field("Scene", "Field of view", "scene.camera.fov_y", "60", 60),
@@ -150,6 +167,8 @@ CHOICES = [
 
 CHECKBOXES = [
     ("Object", "Double sided", "scene.materials.lamp.double_sided"),
+    ("Object", "Unlit", "scene.materials.lamp.unlit"),
+    ("Object", "Thin walled", "scene.materials.lamp.thin_walled"),
     ("Object", "Snap", "preferences.snap.enabled"),
     ("Render", "NoR adapts", "scene.settings.nor_adapts"),
     ("Method", "Tile grid", "preferences.display.tile_grid"),
@@ -184,12 +203,13 @@ SECTIONS = {
 SECTIONS |= {"Settings of the scene", "Display", "Measurements"}
 SHOWN_ONLY = {"Image", "Step time plot", "Device"}
 SHOWN_ONLY |= {"   File"}
-NOT_AT_FIRST = {f"Remove##{name}" for name in TEXTURES if name != "normal_texture"}
+MAPPED = ("normal_texture", "clearcoat_normal_texture")
+NOT_AT_FIRST = {f"Remove##{name}" for name in TEXTURES if name not in MAPPED}
 """Buttons that have nothing to do."""
 ELSEWHERE = {
     "Name", "Uniform scale", "Emission colour", "Emission strength", "New##material", "Duplicate##material",
     "Frame selected##camera", "Reset##camera", "Pin this picture", "Remove##normal_texture",
-    "Active camera", "New from view##camera",
+    "Remove##clearcoat_normal_texture", "Active camera", "New from view##camera",
     "Rename…##camera", "Delete##camera", "Lens", "Sensor fit", "Projection", "Depth of field",
     "Focus on selected##camera", "Sky", "Sun disc",
 }  # fmt: skip
