@@ -18,7 +18,7 @@ __kernel void first_hits(LAUNCH_PARAMETERS, SHADING_PARAMETERS, PATH_STATE_PARAM
     surface.face &= INDEX_MASK(surface.object);
     surface.object = INDEX_OR_0(surface.object);
     const Shading shading = {SHADING_ARGUMENTS};
-    Vec3 color = surface_material(&shading, &surface).base_color;
+    Vec3 color = seen_color(&shading, &surface);
     store3(first_surface, pixels, pixel, select(missed, nothing, surface.shading));
     first_surface[3u * pixels + pixel] = missed ? INFINITY : surface.distance;
     store3(first_surface + 4u * pixels, pixels, pixel, select(missed, nothing, color));

@@ -107,3 +107,14 @@ INLINE SurfaceMaterial surface_material(const Shading *shading, const Surface *s
 #endif
     return m;
 }
+
+// The base colour for auxiliary images: also of what shines with it.
+INLINE Vec3 seen_color(const Shading *shading, const Surface *surface) {
+    SurfaceMaterial m = surface_material(shading, surface);
+#if HAS_TRAIT(UNLIT)
+    int unlit = (shading->materials[surface->material].flags & MATERIAL_UNLIT) != 0u;
+    return select(unlit, m.emission, m.base_color);
+#else
+    return m.base_color;
+#endif
+}

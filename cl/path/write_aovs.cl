@@ -12,7 +12,7 @@ INLINE void write_aovs_path(const Shading *shading, const State *state, uint pat
     surface.material &= INDEX_MASK(surface.object);
     surface.face &= INDEX_MASK(surface.object);
     surface.object = INDEX_OR_0(surface.object);
-    Vec3 albedo = select(missed, nothing, surface_material(shading, &surface).base_color);
+    Vec3 albedo = select(missed, nothing, seen_color(shading, &surface));
     Vec3 normal = select(missed, nothing, surface.shading);
     path_buffer[SAMPLE_ALBEDO_R * stride + place] = albedo.x;
     path_buffer[SAMPLE_ALBEDO_G * stride + place] = albedo.y;

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from incpt.core.arrays import REAL, numbers
 from incpt.core.checks import described, one_of, require
 from incpt.core.errors import InputError
+from incpt.picture.color import srgb_from_linear
 
 CURVES = ("agx", "filmic", "srgb")
 LARGEST_EXPOSURE = 1000
@@ -79,9 +80,7 @@ def display_values(
 
 
 def _srgb(linear: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """IEC 61966-2-1."""
-    x = np.minimum(linear, 1.0)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+    return srgb_from_linear(np.minimum(linear, 1.0))
 
 
 def _agx(linear: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

@@ -59,7 +59,7 @@ def describe(scene: Scene) -> list[str]:
         f"objects: {len(scene.objects):,}" + (f" ({hidden:,} hidden)" if hidden else ""),
         f"meshes: {len(meshes):,} with {stored:,} triangles; {placed:,} triangles placed",
         f"materials: {len(scene.materials):,}",
-        f"textures: {_described_textures(scene)}",
+        f"textures: {described_textures(scene)}",
         f"lights: {_described_lights(scene)}",
         f"emissive objects: {len(lights):,} with {sum(len(o.mesh.faces) for o in lights):,} triangles",
         f"environment: {_described_environment(scene.environment)}",
@@ -74,7 +74,8 @@ def describe(scene: Scene) -> list[str]:
     return lines + [f"warning: {problem}" for problem in scene_problems(scene)]
 
 
-def _described_textures(scene: Scene) -> str:
+def described_textures(scene: Scene) -> str:
+    """How many images the materials read, and what they take on a device; "none"."""
     found = {
         texture.bitmap
         for material in scene.materials.values()

@@ -353,6 +353,7 @@ def test_top_level_has_every_object_once(device: Device, count: int) -> None:
         assert (tree.nodes["child"] == layout.NODE_EMPTY).all()
 
 
+@pytest.mark.slow
 def test_refit_fits_the_new_vertices(device: Device) -> None:
     rng = np.random.default_rng(5)
     mesh = soup(rng, 2000)
@@ -510,6 +511,7 @@ def test_closed_meshes_are_watertight(device: Device, placement: dict[str, objec
     assert (world.occlude(origins, directions, np.inf) == 0).all()
 
 
+@pytest.mark.slow
 def test_no_ray_slips_through_where_reciprocals_are_two_ulps_off() -> None:
     mesh = shapes.shape("sphere")
     rng = np.random.default_rng(14)

@@ -41,6 +41,7 @@ def ready() -> None:
     pass
 
 
+@pytest.mark.slow
 def test_marks_and_timeline(bench: EditBench) -> None:
     settings = small_settings(strategy="spiral", nor=16, nor_adapts=False)
     line = bench.run(EDIT, settings, Marks((0, 1, 3), (1e-6, 30 * 1e-3), done=True), nothing, ready)

@@ -95,6 +95,7 @@ def test_a_drag_ends_after_its_steps() -> None:
 # --------------------------------------------------------------------------------------- equal paths
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variant", [RESTART, SPIRAL, IMPACT])
 def test_as_many_paths_are_spent_as_a_mark_allows(start: EditBench, variant: Variant) -> None:
     session = start.at(start.start(variant.settings(SETTINGS), nothing))
@@ -192,6 +193,7 @@ def test_pictures_on_the_screen(bench: ImpactBench, start: EditBench) -> None:
     np.testing.assert_allclose(found[1].image, fresh.image(), rtol=1e-4, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_denoised_picture_comes_later(bench: ImpactBench, start: EditBench) -> None:
     bench._denoiser = Plain()  # type: ignore[assignment]
     bench._clock = Ticks()
@@ -235,6 +237,7 @@ def test_without_the_denoiser_it_is_said_what_brings_it(
 # --------------------------------------------------------------------------------------------- drags
 
 
+@pytest.mark.slow
 def test_drag(bench: ImpactBench) -> None:
     scene = STAGES["cornell"].scene
     start = bench.start(scene, "cornell", 16)

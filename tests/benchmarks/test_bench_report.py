@@ -80,6 +80,7 @@ def test_scattered_rays_leave_surfaces_in_random_order(tracer: Tracer) -> None:
     assert np.isfinite(tracer.place(scattered).result()).mean() > 0.7
 
 
+@pytest.mark.slow
 def test_visits_count_tests(tracer: Tracer, device: Device) -> None:
     away = Rays(*(np.float32([[0, 50, 0]]), np.float32([[0, 1, 0]]), np.float32([np.inf])))
     assert tracer.visits(away) == (1, 0)  # the root of the top level, and nothing else
@@ -282,6 +283,7 @@ def test_report_of_every_experiment(tmp_path: Path) -> None:
     assert "<b>million rays per second</b>" in text
 
 
+@pytest.mark.slow
 def test_report_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main.main(["bench", "report", str(tmp_path)]) == 2
     assert "no results" in capsys.readouterr().err
@@ -297,6 +299,7 @@ def test_every_experiment_has_tables_of_nothing(name: str) -> None:
     assert EXPERIMENTS[name].tables(Results())
 
 
+@pytest.mark.slow
 def test_plots_stand_for_themselves() -> None:
     law = fitted([1, 10, 100], [2, 20, 200])
     assert law is not None

@@ -34,6 +34,7 @@ def test_scene_has_the_triangles_that_are_said(name: str) -> None:
     bench.scene.object(bench.moves)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["terrain-100k", "ball-1m"])  # the others are made the same way
 def test_large_scene_has_the_triangles_that_are_said(name: str) -> None:
     bench = scenes.LARGE_SCENES[name]

@@ -43,6 +43,7 @@ def test_overhead_is_what_kernels_leave() -> None:
     assert steps.overhead({"ms": 20.0, "kernels_ms": 19.0}) == pytest.approx(0.05)
 
 
+@pytest.mark.slow
 def test_kernels_of_a_step_fit_into_it() -> None:
     device = steps.ProfiledDevice()
     session = Session(SCENES["cornell"].scene, settings=RenderSettings(size=(128, 96)), device=device)

@@ -50,6 +50,7 @@ def test_digest_tells_content_apart() -> None:
         digest(object())
 
 
+@pytest.mark.slow
 @given(st.recursive(st.none() | st.integers() | st.text() | st.floats(allow_nan=False), st.lists))
 def test_digest_is_that_of_what_json_keeps(value: Any) -> None:
     # A subject is compared after it has been to disk and back.

@@ -91,6 +91,7 @@ def test_rays_of_a_place_meet_where_it_is_sharp(camera: Camera, focus: float, se
     assert spread < 1e-4 + 1e-4 * focus + 2e-6 * np.abs(starts).max() * max(1, focus)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blades", [0, 3, 5, 6, 64])
 def test_apertures_are_filled_evenly(blades: int) -> None:
     count = 1 << 17

@@ -227,6 +227,7 @@ def test_furnace_polished_white_plastic(roughness: float) -> None:
         np.testing.assert_allclose(reflected_share(material, angle), 1, atol=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", ANGLES_DEG)
 def test_samples_estimate_the_integral(angle: float) -> None:
     for name in ("plastic", "half a layer", "dense plastic", "metal", "half metal"):
@@ -259,6 +260,7 @@ def _single_scattering(roughness: float, cosine: float) -> tuple[float, float]:
     return float(value.mean()), float((value * schlick).mean())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", [2, 5, 10, 16, 24, 31])
 def test_albedo_table(row: int) -> None:
     table, last = albedo.table(), layout.ALBEDO_TABLE_SIZE - 1
@@ -267,6 +269,7 @@ def test_albedo_table(row: int) -> None:
         np.testing.assert_allclose(table[:, row, column], expected, atol=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("roughness", [0.2, 0.5, 0.8, 1.0])
 def test_furnace_metal(roughness: float) -> None:
     """White metal reflects everything, coloured metal at least what it reflects at once; without multiple
@@ -293,6 +296,7 @@ def test_furnace_between_metal_and_plastic(metallic: float) -> None:
         np.testing.assert_allclose(integral(material, angle), 1, atol=8e-3)
 
 
+@pytest.mark.slow
 def test_no_material_reflects_more_than_arrives() -> None:
     rng = np.random.default_rng(13)
     for _ in range(25):

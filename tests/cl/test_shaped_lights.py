@@ -94,6 +94,7 @@ def met(light: Light, directions: Array) -> tuple[Array, Array]:
     return pdf, distance
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in LIGHTS if "rectangle" in name])
 def test_parts_of_rectangles_are_chosen_by_their_solid_angle(name: str) -> None:
     light = LIGHTS[name]
@@ -114,6 +115,7 @@ def test_parts_of_rectangles_are_chosen_by_their_solid_angle(name: str) -> None:
     assert chi_square(counts, cells / cells.sum() * counts.sum()) > SIGNIFICANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in LIGHTS if name != "long rectangle"])
 def test_samples_follow_their_density(name: str) -> None:
     light = LIGHTS[name]

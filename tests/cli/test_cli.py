@@ -101,6 +101,7 @@ def test_a_scene_that_asks_for_aovs_needs_no_option(scene_file: Path, tmp_path: 
     assert run("render", tmp_path / "b.toml", "-o", tmp_path / "a.png", "--spp", 1) == 0
 
 
+@pytest.mark.slow
 def test_render_writes_what_the_session_renders(scene_file: Path, tmp_path: Path) -> None:
     output = tmp_path / "out.exr"
     assert run("render", scene_file, "-o", output, "--spp", 4) == 0
@@ -130,6 +131,7 @@ def test_a_camera_is_chosen_by_its_name(scene_file: Path, tmp_path: Path) -> Non
     assert run("render", two, "-o", tmp_path / "b.exr", "--camera", "side") == 2
 
 
+@pytest.mark.slow
 def test_the_seed_chooses_the_samples(scene_file: Path, tmp_path: Path) -> None:
     pictures = []
     for seed, name in ((0, "a"), (0, "b"), (1, "c")):

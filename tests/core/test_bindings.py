@@ -67,6 +67,7 @@ def test_files_of_kernels_are_known() -> None:
     assert bindings.FILES.keys() <= KERNELS.keys()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(KERNELS))
 def test_kernels_declare_what_is_bound(device: Device, name: str) -> None:
     if name == "trace_blocks" and device.block_paths is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from importlib import resources
 
@@ -12,10 +12,11 @@ import pytest
 from support.small_scenes import mixed_scene
 
 from incpt.benchmarks.kit.scenes import cornell, glass, plates
-from incpt.core import arena
+from incpt.core import arena, bindings
 from incpt.core.errors import DeviceError, InputError
 from incpt.device import pocl, program
 from incpt.device.device import DEVICE_VARIABLE, Device, all_devices, choose, device_name
+from incpt.render import wavefront
 from incpt.render.blocks import traces_in_blocks
 from incpt.render.session import Session
 from incpt.render.wavefront import Wavefront
@@ -185,6 +186,7 @@ def frosted_scene() -> Scene:
     return mixed_scene().with_material("glass", roughness=0.6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "make",
     [mixed_scene, half_clear_scene, frosted_scene, cornell, glass, plates],
@@ -204,6 +206,7 @@ def test_blocks_and_wavefront_agree(make: Callable[[], Scene], device: Device) -
     assert images[0].mean() == pytest.approx(images[1].mean(), rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [mixed_scene, cornell, glass, plates], ids=lambda make: make.__name__)
 def test_blocks_are_the_same_without_instructions_of_avx512(
     make: Callable[[], Scene], device: Device, monkeypatch: pytest.MonkeyPatch
@@ -220,6 +223,7 @@ def test_blocks_are_the_same_without_instructions_of_avx512(
     np.testing.assert_allclose(images[0], images[1], rtol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [mixed_scene, cornell], ids=lambda make: make.__name__)
 def test_blocks_of_every_size_make_the_same_picture(make: Callable[[], Scene], device: Device) -> None:
     if not traces_in_blocks(device):
@@ -303,19 +307,20 @@ VARIANTS = [
 ]
 
 
-def remarks_on_vectorisation(device: Device, text: str) -> list[str]:
+def warnings_of(device: Device, text: str) -> list[str]:
+    """What the compiler warns of, loops among it that it could not vectorise."""
     log = device.build(text, "trace_blocks").get_build_info(device.cl_device, cl.program_build_info.LOG)
-    return [line for line in log.splitlines() if "not vectorized" in line]
+    return [line for line in log.splitlines() if "warning" in line]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("features", VARIANTS, ids=lambda features: " ".join(features) or "plain")
 def test_pocl_runs_shading_in_simd_lanes(device: Device, features: tuple[str, ...]) -> None:
-    """Every loop over a block that asks for SIMD lanes gets them; the compiler warns where it cannot."""
-    if not device.is_pocl:
-        pytest.skip("PoCL's compiler is the one that needs it")
-    text = device.program_text("trace_blocks", features)
-    assert remarks_on_vectorisation(device, text) == []
+    """Every loop over a block that asks for SIMD lanes gets them; the compiler warns where it cannot, and of
+    nothing else."""
+    if not device.is_clang_cpu:
+        pytest.skip("other compilers warn of code that is made for clang on a CPU")
+    assert warnings_of(device, device.program_text("trace_blocks", features)) == []
 
 
 def test_loops_that_pocl_cannot_vectorise_are_noticed(device: Device) -> None:
@@ -329,26 +334,26 @@ __kernel WIDE void roots(__local float *plane, uint count) {
         plane[i] = sqrt(plane[i]);
 }
 """
-    assert remarks_on_vectorisation(device, text + loop) != []
-    assert remarks_on_vectorisation(device, text + loop.replace("sqrt", "SQRT")) == []
+    assert warnings_of(device, text + loop) != []
+    assert warnings_of(device, text + loop.replace("sqrt", "SQRT")) == []
+
+
+def of_wavefront(variants: Iterable[tuple[str, ...]]) -> set[tuple[str, tuple[str, ...]]]:
+    """The files of all stages' kernels, each with those features that a wavefront builds it with."""
+    launches = (launch for features in variants for launch in wavefront._launches_of(features))
+    return {(bindings.FILES.get(launch.kernel, launch.kernel), launch.features) for launch in launches}
 
 
 @pytest.mark.slow
 def test_kernels_build_without_warnings(device: Device) -> None:
     if not device.is_clang_cpu:
         pytest.skip("other compilers warn of code that is made for clang on a CPU")
-    variants = [*VARIANTS, ("EMISSION_ONLY",), ("EMISSION_ONLY", "CLAMP_INDIRECT")]
-    for file, path in program.files().items():
-        text = program.source(path)
-        if "__kernel" not in text:
-            continue
-        asked = [(), ("LENS",)] if file == "generate" else [()]
-        for features in variants if "LIGHT_SAMPLING" in text else asked:
-            if file == "choose_lights" and "LIGHT_TREE" not in features:
-                continue
-            if file == "sample_lights" and not set(features) & {*LIGHTS, "SHAPED_LIGHTS"}:
-                continue  # launched only where there is something to sample
-            built = cl.Program(device.context, device.program_text(file, features))
-            built.build(options=["-Werror"])
-            log = built.get_build_info(device.cl_device, cl.program_build_info.LOG)
-            assert "warning" not in log, (file, features, log)
+    files = {file for file, path in program.files().items() if "__kernel" in program.source(path)}
+    # Blocks have a test of their own, and without lights there is nothing to sample.
+    plain = {(file, ()) for file in files - {"trace_blocks", "sample_lights", "choose_lights"}}
+    variants = [*VARIANTS, *((*features, "CLAMP_INDIRECT") for features in VARIANTS[:2])]
+    for file, features in sorted({*plain, ("generate", ("LENS",)), *of_wavefront(variants)}):
+        built = cl.Program(device.context, device.program_text(file, features))
+        built.build(options=["-Werror"])
+        log = built.get_build_info(device.cl_device, cl.program_build_info.LOG)
+        assert "warning" not in log, (file, features, log)

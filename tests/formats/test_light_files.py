@@ -128,6 +128,7 @@ def test_files_are_tried_with_every_value_of_lights() -> None:
     assert {*VALUES, "power", "radiance", "irradiance"} == {field.name for field in fields(Light)}
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     lamp=st.builds(Light, power=strengths, **VALUES) | st.builds(Light, radiance=strengths, **VALUES),

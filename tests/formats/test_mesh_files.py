@@ -386,6 +386,7 @@ def test_stored_meshes_are_checked(tmp_path: Path) -> None:
         mesh_files.load_mesh(tmp_path / "b.npz")
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     suffix=st.sampled_from(["ply", "obj", "stl", "glb", "gltf", "off", "npz"]),

@@ -202,8 +202,11 @@ def test_the_setting_is_true_or_false(value: object) -> None:
         RenderSettings(aovs=value)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("in_blocks", [True, False])
 def test_build_leaves_no_kernel_to_be_built(monkeypatch: pytest.MonkeyPatch, in_blocks: bool) -> None:
+    # For what is built, launches of one size will do.
+    monkeypatch.setattr("incpt.render.wavefront.BUILD_SIZES", (1,))
     own = Device()
     session_of(own, mixed_scene(), in_blocks, aovs=False).build()
     session = session_of(own, mixed_scene(), in_blocks)
@@ -219,6 +222,7 @@ def test_a_scene_file_may_ask_for_them(tmp_path: Path) -> None:
     assert registry.load(tmp_path / "a.toml").settings.aovs
 
 
+@pytest.mark.slow
 def test_under_impact_they_are_of_the_edited_scene(device: Device) -> None:
     """In a drag, too, where what the step before it showed is in neither scene, and after undo."""
     start = mixed_scene()

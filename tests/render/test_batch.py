@@ -33,6 +33,7 @@ def without_sky() -> Scene:
     return replace(scene, environment=Environment((0, 0, 0)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("in_blocks", [False, True], ids=["wavefront", "blocks"])
 @pytest.mark.parametrize("other", [dark_scene, without_sky, cornell, glass], ids=lambda make: make.__name__)
 def test_the_same_paths_in_another_scene(other: Callable[[], Scene], in_blocks: bool, device: Device) -> None:

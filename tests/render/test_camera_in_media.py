@@ -34,6 +34,7 @@ def nested(*bodies: tuple[str, float]) -> Scene:
     return Scene(camera, Environment((1, 1, 1)), materials, tuple(objects))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("in_blocks", [True, False], ids=["blocks", "wavefront"])
 @pytest.mark.parametrize(
     ("bodies", "depth"),
@@ -73,6 +74,7 @@ def test_hidden_from_outside_nothing_changes() -> None:
     np.testing.assert_allclose(image, np.broadcast_to(np.exp([-4.0, -2.0, 0.0]), image.shape), rtol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("in_blocks", [True, False], ids=["blocks", "wavefront"])
 def test_paths_notice_that_the_medium_around_the_camera_changes(in_blocks: bool) -> None:
     ball = Object("ball", shape("sphere"), "matte", (0, 0, -0.5), scale=(0.3, 0.3, 0.3))

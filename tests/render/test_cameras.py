@@ -91,6 +91,7 @@ def test_light_of_a_point_does_not_depend_on_the_aperture() -> None:
     assert sums[1] == pytest.approx(sums[0], rel=0.03)
 
 
+@pytest.mark.slow
 @kinds
 def test_in_a_furnace_all_is_white(kind: str) -> None:
     scene = Scene(
@@ -105,6 +106,7 @@ def test_in_a_furnace_all_is_white(kind: str) -> None:
     np.testing.assert_allclose(render(scene, 16, max_bounces=100, roulette_depth=200), 1, rtol=2e-3)
 
 
+@pytest.mark.slow
 @kinds
 @pytest.mark.parametrize("in_blocks", [True, False], ids=["blocks", "wavefront"])
 def test_what_is_picked_is_where_it_is_seen(kind: str, in_blocks: bool) -> None:
@@ -158,6 +160,7 @@ def test_a_change_is_seen_within_the_windows_of_its_object(kind: str) -> None:
     assert left < x < right and top < y < bottom
 
 
+@pytest.mark.slow
 @kinds
 def test_blocks_and_wavefront_agree(kind: str) -> None:
     scene = mixed_scene(size=(53, 37), base_nor=8).with_camera(**KINDS[kind])
@@ -197,6 +200,7 @@ def test_an_edit_behind_a_lens_converges_to_a_fresh_render() -> None:
     assert abs(bias) < 5 * np.sqrt((noise**2).mean() * 1.25 / mean.size)
 
 
+@pytest.mark.slow
 def test_pixels_that_show_a_bit_of_what_changed_count_as_changed() -> None:
     """Behind a lens that is as far as the blur reaches, whatever the middle of the lens sees."""
     shown = []
@@ -220,6 +224,7 @@ def test_pixels_that_show_a_bit_of_what_changed_count_as_changed() -> None:
     assert blur.min() > 2 and shown[1].sum() < shown[1].size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("in_blocks", [True, False], ids=["blocks", "wavefront"])
 @pytest.mark.parametrize("near", [0.0, 2.2])
 def test_a_medium_around_the_near_plane_is_a_part_of_all_paths(near: float, in_blocks: bool) -> None:
@@ -245,6 +250,7 @@ def test_near_cuts_off_what_is_nearer() -> None:
         assert (hits.depth[np.isfinite(hits.depth)] >= near).all()
 
 
+@pytest.mark.slow
 def test_a_camera_starts_in_the_media_around_its_near_plane() -> None:
     materials = {
         "dark": Material((1, 1, 1), roughness=0, transmission=1, ior=1.0, specular=0, absorption=(1,) * 3)

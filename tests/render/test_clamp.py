@@ -46,6 +46,7 @@ def test_each_addition_is_held_below_the_limit() -> None:
     assert np.isclose(added.mean(axis=-1), LIMIT, rtol=1e-4).mean() > 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [cornell, frosted, environment], ids=lambda make: make.__name__)
 def test_direct_light_stays_and_nothing_else(make: Callable[[], Scene]) -> None:
     """Of opaque surfaces, rough glass and an image of the environment, which stages of their own bring."""
@@ -67,6 +68,7 @@ def test_the_clamp_darkens() -> None:
     assert means == sorted(means) and means[0] < 0.95 * means[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("in_blocks", [True, False], ids=["blocks", "wavefront"])
 def test_a_lamp_behind_glass_is_seen_whole_and_a_caustic_is_not(in_blocks: bool) -> None:
     materials = {
@@ -96,6 +98,7 @@ def test_a_lamp_behind_glass_is_seen_whole_and_a_caustic_is_not(in_blocks: bool)
     assert pictures[3].mean() < 5e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [mixed_scene, cornell], ids=["mixed", "cornell"])
 def test_blocks_and_wavefront_agree(make: Any) -> None:
     scene = make()
@@ -109,6 +112,7 @@ def test_blocks_and_wavefront_agree(make: Any) -> None:
     assert images[0].mean() == pytest.approx(images[1].mean(), rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("strategy", ["restart", "spiral", "impact"])
 def test_another_limit_starts_the_picture_over(strategy: str) -> None:
     scene = mixed_scene(strategy=strategy, base_nor=4)
@@ -124,6 +128,7 @@ def test_another_limit_starts_the_picture_over(strategy: str) -> None:
     np.testing.assert_array_equal(session.image(), fresh.image())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("in_blocks", [True, False], ids=["blocks", "wavefront"])
 def test_pairs_of_paths_are_clamped_alike(in_blocks: bool) -> None:
     scene = mixed_scene(clamp_indirect=0.1)

@@ -45,6 +45,7 @@ def share_cut_off(device: Device, in_blocks: bool, material: Material, passages:
     return report.cut_off / report.paths
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("passages", [0, 1, 2, 3])
 def test_the_share_is_what_fresnel_leaves_in_the_pane(device: Device, in_blocks: bool, passages: int) -> None:
     # The first passage leads in. Of those behind it a path takes another where it is reflected inside.
@@ -59,6 +60,7 @@ def test_paths_that_carry_nothing_more_are_not_counted(device: Device, in_blocks
     assert share_cut_off(device, in_blocks, replace(GLASS, base_color=(0.1, 0, 0)), 0) > 0.9
 
 
+@pytest.mark.slow
 def test_other_ends_are_not_counted(device: Device, in_blocks: bool) -> None:
     rough = replace(GLASS, roughness=0.5)  # max_bounces is for these
     for material in (rough, replace(GLASS, transmission=0, roughness=0.3), replace(GLASS, ior=1.0)):

@@ -53,6 +53,7 @@ def grid(cells: int) -> Mesh:
     return Mesh(vertices, faces, uvs=(vertices[faces][..., [0, 2]] + 0.5,))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layers", [1, 3])
 def test_what_is_behind_is_seen_by_its_share(layers: int) -> None:
     """Black gauze of half and more in front of a constant sky."""
@@ -94,6 +95,7 @@ def under_a_screen(
     return Scene(camera, environment or Environment(), materials, tuple(objects))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("in_blocks", [True, False])
 def test_light_of_lamps_comes_through_by_its_share(in_blocks: bool) -> None:
     if in_blocks and not traces_in_blocks(device()):
@@ -164,6 +166,7 @@ def test_colours_at_corners_have_an_alpha_too() -> None:
     np.testing.assert_allclose(*images, rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_what_covers_in_part_and_shines_is_found_by_rays() -> None:
     """Half of the light of a lamp that covers half."""
     shining = Material((0, 0, 0), specular=0, emission=(5, 5, 5), double_sided=True)

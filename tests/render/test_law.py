@@ -14,7 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
-from support.law import assert_within_noise
+from support.law import LARGE_STEPS, assert_within_noise
 from support.small_scenes import mixed_scene, sky
 
 from incpt.device.device import Device
@@ -191,7 +191,7 @@ def test_impact_converges_to_a_fresh_render(
     device: Device, sequence: list[tuple[Edit, int]], slots: int | None
 ) -> None:
     session, scene = apply_all(device, "impact", sequence, slots)
-    session.configure(replace(session.settings, slots_per_step=None))
+    session.configure(replace(session.settings, slots_per_step=LARGE_STEPS))
     # Heavy tails of a few glass paths would need thousands of samples to show in both.
     session.render(256)
     assert_within_noise(device, session, scene, 128)

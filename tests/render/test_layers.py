@@ -205,6 +205,15 @@ def test_unlit_surfaces_shine_with_their_base_colour_and_reflect_nothing() -> No
             np.testing.assert_allclose(image, np.broadcast_to(expected, image.shape), rtol=1e-4)
 
 
+def test_unlit_surfaces_have_their_base_colour_in_auxiliary_images() -> None:
+    scene = room().with_object("sign", position=(0, 0.5, 1), scale=(20, 1, 20))
+    session = Session(scene, device=device(), settings=replace(scene.settings, aovs=True))
+    session.render(1)
+    albedo = session.pass_image("albedo")
+    np.testing.assert_allclose(albedo[14, 22], SIGN.base_color, rtol=1e-4)
+    np.testing.assert_allclose(session.first_hits().albedo[14, 22], SIGN.base_color, rtol=1e-4)
+
+
 # -------------------------------------------------------------------------------- numbers and textures
 
 

@@ -97,6 +97,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_floor_under_a_light(name: str) -> None:
     light, kind = CASES[name], CASES[name].kind
@@ -277,6 +278,7 @@ def test_far_from_the_origin(kind: str, offset: tuple[float, float, float]) -> N
     np.testing.assert_allclose(blocks(b, 8), blocks(a, 8), rtol=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["point", "sphere", "spot", "rectangle", "disk"])
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e4])
 def test_at_every_scale(kind: str, size: float) -> None:
@@ -290,6 +292,7 @@ def test_at_every_scale(kind: str, size: float) -> None:
     np.testing.assert_allclose(blocks(b, 8), blocks(a, 8), rtol=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", ["rectangle,ball,disk,spot,sun,hidden", "ball,sky", "glass,disk,spot,sun"])
 def test_blocks_and_wavefront_agree(names: str) -> None:
     if not traces_in_blocks(device()):

@@ -44,6 +44,7 @@ def seen(scene: Scene, in_blocks: bool, spp: int = 64, **settings: int) -> float
     return float(session.image().mean())
 
 
+@pytest.mark.slow
 @SCHEDULES
 @pytest.mark.parametrize(
     ("origin", "within"),
@@ -56,6 +57,7 @@ def test_floor_under_a_lamp_far_from_the_origin(origin: Vector, within: float, i
     assert found == pytest.approx(10 * 0.8 * 0.23945, rel=within)
 
 
+@pytest.mark.slow
 @SCHEDULES
 @pytest.mark.parametrize("floor_size", [4.0, 1000.0])
 @pytest.mark.parametrize("height", [1e-1, 1e-3, 1e-5, 1e-6])
@@ -76,6 +78,7 @@ def test_sizes_of_a_lamp_and_its_floor(size: float, in_blocks: bool) -> None:
     assert seen(scene, in_blocks) == pytest.approx(1.9156, rel=0.01)
 
 
+@pytest.mark.slow
 @SCHEDULES
 def test_a_turned_floor_far_away_neither_loses_light_nor_lets_any_through(in_blocks: bool) -> None:
     """A lamp above a turned board is seen from above as it is near the origin, and not at all from below."""

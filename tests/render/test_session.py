@@ -11,6 +11,7 @@ from support.small_scenes import mixed_scene, small_settings
 from incpt.core.errors import DeviceError, InputError
 from incpt.core.settings import STRATEGIES
 from incpt.device.device import Device
+from incpt.render import wavefront
 from incpt.render.modes import Mode
 from incpt.render.plan import Cursor, Queue
 from incpt.render.session import Session
@@ -75,6 +76,7 @@ def test_repetitions_equal_refinement_passes(
     assert_same(rendered(device, mixed_scene(base_nor=nor, slots_per_step=slots), 64).image(), converged)
 
 
+@pytest.mark.slow
 def test_nor_256_equals_256_refinement_passes(device: Device) -> None:
     passes = rendered(device, mixed_scene(), 256).image()
     tile = rendered(device, mixed_scene(base_nor=256, slots_per_step=100), 256)
@@ -104,6 +106,7 @@ def test_tile_size_does_not_matter(device: Device, converged: np.ndarray, tile_s
     assert_same(rendered(device, mixed_scene(tile_size=tile_size, base_nor=8), 64).image(), converged)
 
 
+@pytest.mark.slow
 def test_paths_go_in_squares_where_they_go_through_trees(device: Device) -> None:
     """As cl/path/tile.cl has it. It is seen by what the path buffer holds of a tile of which a lamp fills the
     left half, with and without a ball that has a tree of its own."""
@@ -122,10 +125,11 @@ def test_paths_go_in_squares_where_they_go_through_trees(device: Device) -> None
         assert (lit == (x[order] < 4)).all()
 
 
+@pytest.mark.slow
 def test_chunks_do_not_matter(device: Device, converged: np.ndarray) -> None:
     session = Session(mixed_scene(base_nor=4), device=device)
-    session._tracer = wavefront = Wavefront(device)
-    wavefront.chunk_paths = 320  # less than a group of slots
+    session._tracer = tracer = Wavefront(device)
+    tracer.chunk_paths = 320  # less than a group of slots
     session.render(64)
     assert_same(session.image(), converged)
 
@@ -303,6 +307,7 @@ def test_nobody_else_writes_to_what_a_session_goes_by(device: Device) -> None:
     assert session.tile_spp.min() > 0
 
 
+@pytest.mark.slow
 def test_step_takes_as_many_slots_as_it_is_given(device: Device, converged: np.ndarray) -> None:
     session = Session(mixed_scene(slots_per_step=1), device=device)
     assert [session.step(slots).paths // 64 for slots in (1, 5, 3, 1000, 24)] == [1, 5, 3, 15, 24]
@@ -351,6 +356,8 @@ def test_alpha_tells_where_there_was_a_picture(device: Device) -> None:
 def test_no_kernel_is_built_after_building(
     device: Device, monkeypatch: pytest.MonkeyPatch, in_blocks: bool
 ) -> None:
+    # For what is built, launches of one size will do.
+    monkeypatch.setattr(wavefront, "BUILD_SIZES", (1,))
     bright = mixed_scene().with_environment(image=None)
     opaque = mixed_scene().without_object("glass ball").with_material("glass", transmission=0.0)
     for scene in (mixed_scene(), bright, bright.without_object("lamp"), opaque):
@@ -373,6 +380,7 @@ def test_no_kernel_is_built_after_building(
         assert_same(session.image(), rendered(device, moved(scene), 17).image())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("strategy", "in_blocks"), [*((s, True) for s in STRATEGIES), ("impact", False)])
 def test_an_edit_that_was_prepared_builds_nothing(
     device: Device, monkeypatch: pytest.MonkeyPatch, strategy: str, in_blocks: bool
@@ -380,6 +388,8 @@ def test_an_edit_that_was_prepared_builds_nothing(
     monkeypatch.setattr(device, "_kernels", {})
     monkeypatch.setattr(device, "built", set())
     session = Session(mixed_scene(strategy=strategy), device=device)
+    # For what is built, launches of one size will do.
+    monkeypatch.setattr(wavefront, "BUILD_SIZES", (1,))
     session._tracer = session._tracer if in_blocks else Wavefront(device)
     session.build(for_edits=False)
     session.render(3)

@@ -43,6 +43,7 @@ def skied(sky: Sky | None = None, **settings: object) -> Scene:
     return mixed_scene(**settings).with_environment(sky=sky, intensity=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("technique", [None, "MIS_ONLY_LIGHT", "MIS_ONLY_BSDF"])
 def test_a_matte_floor_reflects_the_irradiance_of_the_sun(technique: str | None) -> None:
     own = device() if technique is None else Device(features=(technique,))
@@ -121,6 +122,7 @@ def test_a_true_sun_has_no_noise_to_speak_of() -> None:
     assert image.std() < 0.12 * image.mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sky", [Sky(25, sun_size=4), Sky(25, sun_disc=False)], ids=["sun", "no sun"])
 def test_blocks_and_wavefront_agree(sky: Sky) -> None:
     scene, images = skied(sky, size=(53, 37), base_nor=8), []
@@ -132,6 +134,7 @@ def test_blocks_and_wavefront_agree(sky: Sky) -> None:
     assert images[0].mean() == pytest.approx(images[1].mean(), rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "sky", [Sky(60), Sky(25, sun_size=9), Sky(25, sun_disc=False), Sky(-4), None], ids=str
 )

@@ -26,6 +26,7 @@ def in_white(material: Material, subdivisions: int) -> Scene:
     return Scene(Camera((0, 0, 4), (0, 0, 0), fov_y=34), Environment((1, 1, 1)), {"m": material}, objects)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("subdivisions", [1, 2])
 @pytest.mark.parametrize("roughness", [0.0, 0.3])
 def test_no_facet_of_smooth_metal_is_black(subdivisions: int, roughness: float) -> None:

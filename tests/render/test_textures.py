@@ -133,6 +133,7 @@ ALIKE: dict[str, tuple[Material, Material]] = {
 """A material with textures that are the same everywhere, and the one without that it stands for."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("in_blocks", [True, False])
 @pytest.mark.parametrize("name", ALIKE)
 def test_a_texture_that_is_the_same_everywhere_is_a_number(name: str, in_blocks: bool) -> None:
@@ -203,6 +204,7 @@ def full_of_textures() -> Scene:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_blocks_and_wavefront_agree() -> None:
     if not traces_in_blocks(device()):
         pytest.skip("no blocks on this device")
@@ -335,6 +337,7 @@ def test_light_and_bsdf_sampling_find_the_same_light_of_a_texture(double_sided: 
         assert_same_mean(both, alone, relative=0.02)
 
 
+@pytest.mark.slow
 def test_a_texture_of_emission_is_as_several_lamps() -> None:
     """The lit pixels of a sign, each a face of its own, against faces of lamps where they are."""
     whole = repeat(sign(windows(), grid(8)), 128, max_bounces=1)

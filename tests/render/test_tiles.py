@@ -55,6 +55,7 @@ def test_grid_worked_by_hand() -> None:
     assert grid.tile_at(49, 32) == 11
 
 
+@pytest.mark.slow
 @given(grids)
 def test_tiles_cover_every_pixel_once(grid: TileGrid) -> None:
     covered = np.zeros((grid.height, grid.width), int)
@@ -155,6 +156,7 @@ def check_groups(slots: np.ndarray) -> None:
         begin = end
 
 
+@pytest.mark.slow
 @given(
     grids.filter(lambda grid: grid.count <= 60),
     near_points,

@@ -92,6 +92,7 @@ def test_work_items_without_a_path_leave_those_of_others_alone(device: Device) -
     np.testing.assert_array_equal(*images)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("without", ["shade_miss", "trace_shadow"])
 def test_both_schedules_follow_the_table_of_stages(
     without: str, device: Device, monkeypatch: pytest.MonkeyPatch

@@ -46,6 +46,7 @@ places = st.tuples(fractions, fractions)
 quick = settings(max_examples=100, deadline=None)
 
 
+@pytest.mark.slow
 @quick
 @given(cameras(), st.lists(places, min_size=1, max_size=8), st.floats(0.2, 5), st.floats(0.01, 100))
 def test_a_ray_meets_what_is_seen_in_its_place(

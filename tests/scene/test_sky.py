@@ -53,6 +53,7 @@ def test_the_way_through_air_at_the_horizon_is_that_of_chapman() -> None:
     assert (model._columns(np.array([0.0, 6.36e6]), np.array([0.8, -0.6])) > 1e12).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sky", "elevation", "azimuth", "blender"),
     [
@@ -93,6 +94,7 @@ def test_integrals_have_converged(monkeypatch: pytest.MonkeyPatch) -> None:
     model._image.cache_clear()
 
 
+@pytest.mark.slow
 def test_a_sky_is_even_and_its_colours_are_those_of_the_day() -> None:
     for elevation in (70, 20, 1, -3, -90):
         pixels = Sky(elevation).image.pixels

@@ -172,6 +172,7 @@ def test_the_tree_of_an_unknown_mesh_is_built(pool: GeometryPool, built: list[st
     assert built == ["build_mesh"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("most", ["_MOST_NODES", "_MOST_PACKS", "_MOST_NORMALS"])
 def test_an_error_takes_nothing(device: Device, monkeypatch: pytest.MonkeyPatch, most: str) -> None:
     monkeypatch.setattr(geometry_pool, most, 20)

@@ -342,6 +342,7 @@ def test_axes_of_the_environment() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rotation", [0.0, 77.0])
 @pytest.mark.parametrize("size", [(24, 48), (7, 5), (1, 3), (5, 1)])
 def test_environment_samples_follow_the_density(rotation: float, size: tuple[int, int]) -> None:

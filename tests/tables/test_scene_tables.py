@@ -168,8 +168,9 @@ def check_as_fresh(tables: SceneTables) -> None:
     assert fresh is not tables
     for name in VALUES:
         assert getattr(tables, name) == getattr(fresh, name), name
+    found = contents(tables)
     for name, expected in contents(fresh).items():
-        np.testing.assert_array_equal(contents(tables)[name], expected, err_msg=name)
+        np.testing.assert_array_equal(found[name], expected, err_msg=name)
     if not scene.objects:
         return
     rows, expected_rows = objects_of(tables), objects_of(fresh)
@@ -192,22 +193,20 @@ def check_as_fresh(tables: SceneTables) -> None:
 
 def check_mesh(mesh: Mesh, nodes: npt.NDArray[np.void], packs: npt.NDArray[np.void]) -> None:
     """From the first node one gets to every face once, and boxes hold what is below them."""
-    faces, stack = list[int](), [0]
-    while stack:
-        node = nodes[stack.pop()]
-        for child, reference in enumerate(node["child"].tolist()):
-            if reference == layout.NODE_EMPTY:
-                continue
-            if not reference & layout.NODE_LEAF:
-                stack.append(reference)
-                continue
-            pack = packs[reference & ~layout.NODE_LEAF]
-            used = pack["face"] != layout.NO_INDEX
-            corners = pack["vertex"][:, used].T.reshape(-1, 3, 3)
-            np.testing.assert_array_equal(corners, mesh.vertices[mesh.faces[pack["face"][used]]])
-            low, high = node["bounds"][:, child].reshape(3, 2).T
-            assert (corners >= low).all() and (corners <= high).all()
-            faces += pack["face"][used].tolist()
+    faces, level = [], np.zeros(1, np.uint32)
+    while level.size:
+        children, bounds = nodes[level]["child"], nodes[level]["bounds"]
+        is_used = children != layout.NODE_EMPTY
+        is_leaf = is_used & (children & layout.NODE_LEAF != 0)
+        pack = packs[children[is_leaf] ^ layout.NODE_LEAF]
+        leaf, lane = np.nonzero(pack["face"] != layout.NO_INDEX)
+        corners, face = pack["vertex"][leaf, :, lane].reshape(-1, 3, 3), pack["face"][leaf, lane]
+        np.testing.assert_array_equal(corners, mesh.vertices[mesh.faces[face]])
+        node, child = np.nonzero(is_leaf)
+        box = bounds[node, :, child].reshape(-1, 1, 3, 2)[leaf]
+        assert (corners >= box[..., 0]).all() and (corners <= box[..., 1]).all()
+        faces += face.tolist()
+        level = children[is_used & ~is_leaf]
     assert sorted(faces) == list(range(len(mesh.faces)))
 
 

@@ -137,6 +137,7 @@ def picture(scene: Scene, device: Device) -> npt.NDArray[np.float32]:
         return session.image()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_alone")
 @pytest.mark.parametrize("in_blocks", [True, False])
 def test_two_sessions_take_turns(device: Device, monkeypatch: pytest.MonkeyPatch, in_blocks: bool) -> None:

@@ -140,6 +140,7 @@ def test_a_file_in_place_of_the_folder_is_told(folder: Path) -> None:
         stored.save(Preferences())
 
 
+@pytest.mark.slow
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=80, deadline=None)
 @given(
     st.dictionaries(

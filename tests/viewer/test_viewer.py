@@ -263,6 +263,7 @@ def test_edits_between_two_steps_become_one(make_viewer: MakeViewer) -> None:
     assert viewer.session.scene == moved(scene, 0.7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step_ms", [5.0, 20.0])
 def test_steps_take_the_time_they_are_given(make_viewer: MakeViewer, step_ms: float) -> None:
     scene = mixed_scene(size=(176, 112))

@@ -28,7 +28,7 @@ def draw(light: Light, refusals: Refusals) -> Light:
 
 
 def _draw_strength(light: Light, refusals: Refusals) -> Light:
-    color = widgets.color("Light colour", light.color, is_radiance=True, tip="Linear RGB, times the strength")
+    color = widgets.color("Light colour", light.color, is_radiance=True, tip="Times the strength")
     light = refusals.changed(light, color=color)
     unit, value = light.strength
     offered = ["irradiance" if light.is_far else "power", *(["radiance"] if light.has_size else [])]

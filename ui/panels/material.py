@@ -37,9 +37,7 @@ def draw_choice(names: tuple[str, ...], current: str, users: int) -> Outcome:
 
 def draw(material: Material, refusals: Refusals) -> Material:
     """Fields for all parameters; returns the material after this frame."""
-    color = widgets.color(
-        "Base colour", material.base_color, tip="Diffuse albedo; of metals the reflectance. Linear RGB"
-    )
+    color = widgets.color("Base colour", material.base_color, tip="Diffuse albedo; of metals the reflectance")
     material = refusals.changed(material, base_color=color)
     material = _draw_share(material, refusals, "metallic", "Metallic", "0: dielectric, 1: metal")
     material = _draw_share(material, refusals, "roughness", "Roughness", "GGX alpha is its square")
@@ -69,7 +67,7 @@ def _draw_sheen(material: Material, refusals: Refusals) -> Material:
     with widgets.section("Sheen", any(material.sheen_color)) as is_open:
         if not is_open:
             return material
-        color = widgets.color("Sheen", material.sheen_color, tip="Fuzz of cloth; black: none. Linear RGB")
+        color = widgets.color("Sheen", material.sheen_color, tip="Fuzz of cloth; black: none")
         material = refusals.changed(material, sheen_color=color)
         return _draw_share(material, refusals, "sheen_roughness", "Sheen rough", "Low: at the edges only")
 
@@ -127,7 +125,7 @@ def _draw_translucency(material: Material, refusals: Refusals) -> Material:
         color = widgets.color(
             "Through colour",
             material.diffuse_transmission_color,
-            tip="Colour of what goes through. Linear RGB",
+            tip="Colour of what goes through",
         )
         return refusals.changed(material, diffuse_transmission_color=color)
 

@@ -11,6 +11,7 @@ from imgui_bundle import imgui
 from incpt.core.settings import CUT_OFF_WORTH_TELLING, STRATEGIES, RenderSettings
 from incpt.render.modes import Mode
 from incpt.render.strategies import strategy_of
+from incpt.scene.summary import described_textures
 from incpt.ui.editor.state import Control
 from incpt.ui.preferences import Preferences
 from incpt.ui.widgets import places, widgets
@@ -56,6 +57,7 @@ def draw_state(frame: Frame | None) -> None:
     widgets.value_row("Samples", f"{least:,} least, {mean:,.1f} mean", "Per pixel")
     height, width = picture.image.shape[:2]
     widgets.value_row("Size", f"{width} × {height}" + (" (preview)" if frame.is_preview else ""))
+    widgets.value_row("Textures", described_textures(frame.view.scene), "Each image is there once")
     widgets.value_row("Speed", f"{frame.paths_per_second / 1e6:.2f} million paths/s")
     widgets.value_row("Step", f"{frame.step_seconds * 1e3:.1f} ms")
     if frame.nonfinite:

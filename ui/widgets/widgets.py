@@ -13,6 +13,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from incpt.core.affine import Vector
+from incpt.picture.color import linear_from_srgb, srgb_from_linear
 from incpt.ui.widgets import places, theme
 
 _AXES = ("X", "Y", "Z")
@@ -114,16 +115,20 @@ def vector(
 
 
 def color(label: str, value: Vector, *, is_radiance: bool = False, tip: str = "") -> Vector:
-    """A linear RGB colour; where `is_radiance`, components may be over 1."""
+    """A linear RGB colour, which people see and type in sRGB, as in other programs: numbers, hex (by a right
+    click) and the picker. Where `is_radiance`, components may be over 1."""
     flags = imgui.ColorEditFlags_.float
     if is_radiance:
         flags |= imgui.ColorEditFlags_.hdr
-    with row(label, tip) as field:
-        shown = list(map(_rounded, value))
+    with row(label, f"{tip}. {_SRGB}" if tip else _SRGB) as field:
+        shown = [_rounded(float(c)) for c in srgb_from_linear(value)]
         changed, result = imgui.color_edit3(field, shown, flags)
         _note(label, changed)
     # A component that was not touched keeps its value to the bit; imgui's 32 bits would round it.
-    r, g, b = (old if new == seen else new for old, seen, new in zip(value, shown, result, strict=True))
+    r, g, b = (
+        old if new == seen else float(linear_from_srgb(new))
+        for old, seen, new in zip(value, shown, result, strict=True)
+    )
     return r, g, b
 
 
@@ -250,6 +255,9 @@ def _clipped_text(label: str, width: float) -> None:
     imgui.text_unformatted(shown)
     if shown != label:
         imgui.set_item_tooltip(label)
+
+
+_SRGB = "In sRGB here; files and Python have it linear"
 
 
 def _rounded(value: float) -> float:

@@ -130,6 +130,7 @@ def test_worth_is_the_law_of_variance() -> None:
 amounts = st.one_of(st.just(0.0), st.floats(1e-9, 1e9))
 
 
+@pytest.mark.slow
 @given(arrays(np.float64, (len(fields(TileSums)), 6), elements=amounts))
 def test_any_sums_give_some_samples(drawn: np.ndarray) -> None:
     sums = TileSums(*drawn)

@@ -35,6 +35,7 @@ def sparse_queue(tiles: np.ndarray, subset: int) -> Queue:
     return Queue(tiles, np.ones(len(tiles), np.int64), False, np.full(len(tiles), subset, np.int8))
 
 
+@pytest.mark.slow
 @given(grids)
 def test_all_passes_take_every_pixel_once(grid: TileGrid) -> None:
     everywhere = squares(grid, np.ones(grid.count, np.bool_))

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
+from support.law import LARGE_STEPS
 from support.pairs import check, traced_pairs
 from support.renders import assert_same_mean, repeat
 from support.small_scenes import mixed_scene
@@ -112,6 +113,7 @@ def in_blocks(request: pytest.FixtureRequest, device: Device) -> bool:
     return bool(request.param)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("edit", EDITS, ids=lambda edit: edit.name)
 def test_a_path_that_met_nothing_that_changed_brings_the_same(
     edit: Edit, in_blocks: bool, device: Device
@@ -120,12 +122,14 @@ def test_a_path_that_met_nothing_that_changed_brings_the_same(
     check(traced_pairs(device, old, edit.apply(old), in_blocks), edit.at_most)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("edit", EDITS[:4], ids=lambda edit: edit.name)
 def test_undo_is_an_edit_too(edit: Edit, in_blocks: bool, device: Device) -> None:
     old = edit.scene()
     check(traced_pairs(device, edit.apply(old), old, in_blocks), edit.at_most)
 
 
+@pytest.mark.slow
 def test_far_from_the_origin(in_blocks: bool, device: Device) -> None:
     """Where a float is a millimetre wide, boxes around lights hold what rays meet of them."""
     scene, offset = mixed(), (8000.0, 100.0, -6000.0)
@@ -166,6 +170,7 @@ def test_lights_of_two_scenes_bring_what_those_of_each_bring(
         assert_same_mean(plain, paired, relative=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["move a ball", "turn a spot", "add", "room: pane", "another kind"])
 def test_edits_then_convergence_equal_a_fresh_render(name: str, device: Device) -> None:
     edit = next(one for one in EDITS if one.name == name)
@@ -183,6 +188,7 @@ def test_edits_then_convergence_equal_a_fresh_render(name: str, device: Device) 
 
 def assert_converges(session: Session, scene: Scene) -> None:
     """The picture becomes that of fresh renders with other random numbers, within their noise."""
+    session.configure(replace(session.settings, slots_per_step=LARGE_STEPS))
     session.render(256)
     fresh = repeat(replace(scene), 128, 4, size=session.size, max_bounces=3)
     noise = np.sqrt(fresh.var(axis=0, ddof=1).mean())

@@ -179,6 +179,7 @@ def in_blocks(request: pytest.FixtureRequest, device: Device) -> bool:
     return bool(request.param)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("edit", EDITS, ids=lambda edit: edit.name)
 def test_a_path_that_met_nothing_that_changed_brings_the_same(
     edit: Edit, in_blocks: bool, device: Device
@@ -190,12 +191,14 @@ def test_a_path_that_met_nothing_that_changed_brings_the_same(
     assert pairs.same_kernels or edit.name == "delete"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("edit", EDITS[:3], ids=lambda edit: edit.name)
 def test_undo_is_an_edit_too(edit: Edit, in_blocks: bool, device: Device) -> None:
     old = edit.scene()
     check(traced_pairs(device, edit.apply(old), old, in_blocks), edit.at_most)
 
 
+@pytest.mark.slow
 def test_blocks_and_wavefront_touch_the_same_paths(device: Device) -> None:
     if not traces_in_blocks(device):
         pytest.skip("no blocks on this device")
@@ -207,6 +210,7 @@ def test_blocks_and_wavefront_touch_the_same_paths(device: Device) -> None:
         assert wavefront.any()
 
 
+@pytest.mark.slow
 def test_slots_without_partners(in_blocks: bool, device: Device) -> None:
     """What paths of such slots met is told all the same."""
     old = mixed()
@@ -221,6 +225,7 @@ def test_slots_without_partners(in_blocks: bool, device: Device) -> None:
     assert 0 < len(some.partners) < len(every.partners)
 
 
+@pytest.mark.slow
 def test_equal_scenes_have_no_partners(in_blocks: bool, device: Device) -> None:
     """Nor do scenes whose difference no path can meet."""
     old = mixed()
@@ -283,6 +288,7 @@ def far(scene: Scene, offset: tuple[float, float, float]) -> Scene:
     return replace(scene, objects=moved, camera=replace(camera, position=position, target=target))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [mixed, blocks_in_a_box, ball_in_a_box], ids=lambda make: make.__name__)
 def test_boxes_contain_rounding_errors_far_from_the_origin(
     make: Callable[[], Scene], in_blocks: bool, device: Device
@@ -295,6 +301,7 @@ def test_boxes_contain_rounding_errors_far_from_the_origin(
     check(traced_pairs(device, old, new, in_blocks, spp=64))
 
 
+@pytest.mark.slow
 def test_a_long_way_to_what_changed(in_blocks: bool, device: Device) -> None:
     """Through a telescope, 10 km away: rays are as inexact as their way is long."""
     old = mixed()
@@ -345,6 +352,7 @@ def test_a_step_tells_how_many_partners_it_traced(device: Device) -> None:
     assert partners == session._state.film.sums()["pairs"][layout.PairPlane.TOUCHED].sum() > 0
 
 
+@pytest.mark.slow
 def test_kernels_of_pairs_are_built_ahead(
     in_blocks: bool, device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -26,6 +26,7 @@ def sampled(
     return edit, state
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spp", [0, 1, 2, 5])
 @pytest.mark.parametrize("size", SIZES, ids=str)
 def test_pictures_equal_the_reference(device: Device, size: tuple[int, int], spp: int) -> None:
@@ -172,6 +173,7 @@ def test_pictures_do_not_darken(device: Device) -> None:
     assert abs(np.mean(biases)) < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weight", [0.0, 0.7, 1.0])
 def test_raw_sums_are_unbiased_with_a_fixed_weight(weight: float) -> None:
     """New values less weighted old ones, which the refined old picture gives back. The weight that is
@@ -201,6 +203,7 @@ EXTREMES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spp", [1, 3])
 @pytest.mark.parametrize("name", EXTREMES)
 def test_extremes_stay_finite_and_equal_the_reference(device: Device, name: str, spp: int) -> None:
@@ -308,6 +311,7 @@ def test_other_guides_take_the_place_of_the_first(device: Device) -> None:
     assert np.abs(rig.picture() - first).max() > 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(70, 45), (530, 20)], ids=str)
 def test_groups_of_work_items_make_the_same_picture(
     size: tuple[int, int], monkeypatch: pytest.MonkeyPatch

@@ -98,6 +98,7 @@ def test_few_samples_are_pooled_over_neighbours_of_their_class(rig: Rig) -> None
     assert many[1].max() <= 11 * changed.sum()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kept", [1, 4, 256])
 @pytest.mark.parametrize(("pairs", "singles"), [(1, 0), (2, 0), (3, 2), (2, 5)])
 def test_variances_and_covariance_are_right_on_average(pairs: int, singles: int, kept: int) -> None:

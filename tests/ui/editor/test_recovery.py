@@ -154,6 +154,7 @@ def killed_editor(scene: Path, folder: Path) -> int:
     return process.pid
 
 
+@pytest.mark.slow
 def test_what_a_killed_editor_leaves_is_found_and_recovered(folder: Path, tmp_path: Path) -> None:
     scene = project(tmp_path)
     pid = killed_editor(scene, folder)

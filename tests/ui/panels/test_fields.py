@@ -14,6 +14,7 @@ from support.ui_harness import Desk, changes, desk, places, state
 
 from incpt.core.layout import TextureSlot
 from incpt.formats import bitmaps
+from incpt.picture.color import linear_from_srgb
 from incpt.scene.material import Material
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
@@ -67,7 +68,7 @@ def vector(panel: str, label: str, place: str, selected: str = "red cube", names
 def colour(panel: str, label: str, place: str, selected: str = "red cube") -> list[Field]:
     # Of the lamp and the sky the greatest components are full, so they are dragged down.
     return [
-        Field(panel, label, f"{place}.{i}", "0.25", 0.25, selected, -30.0, across)
+        Field(panel, label, f"{place}.{i}", "0.25", float(linear_from_srgb(0.25)), selected, -30.0, across)
         for i, across in enumerate((RED, GREEN, BLUE))
     ]
 
@@ -202,7 +203,7 @@ SECTIONS = {
 }
 SECTIONS |= {"Settings of the scene", "Display", "Measurements"}
 SHOWN_ONLY = {"Image", "Step time plot", "Device"}
-SHOWN_ONLY |= {"   File"}
+SHOWN_ONLY |= {"   File", "Textures"}
 MAPPED = ("normal_texture", "clearcoat_normal_texture")
 NOT_AT_FIRST = {f"Remove##{name}" for name in TEXTURES if name not in MAPPED}
 """Buttons that have nothing to do."""
@@ -503,7 +504,7 @@ def test_a_radiance_is_a_colour_and_a_strength(user: Desk) -> None:
     places_of = {f"scene.materials.lamp.emission.{i}" for i in range(3)}
     assert changes(before, state(user.editor)) == places_of
     assert user.scene.materials["lamp"].emission == pytest.approx((24, 22, 20))
-    user.type("Emission colour", "0.5", across=BLUE)
+    user.type("Emission colour", "0.735357", across=BLUE)  # in sRGB: 0.5
     assert user.scene.materials["lamp"].emission == pytest.approx((24, 22, 12))
     user.drag("Emission strength", 30)
     r, g, b = user.scene.materials["lamp"].emission
