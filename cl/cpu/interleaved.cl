@@ -300,13 +300,15 @@ INLINE void interleaved_trace(const Block *block, __local const float *rays, __l
     }
 }
 
-#ifndef BRUTE_FORCE_ONLY
+#if !defined(BRUTE_FORCE_ONLY) || defined(LIGHT_TREE)
 STAGE void prepare_rays(__local float *prepared, __local const float *rays, uint count) {
     LANES
     for (int i = 0; i < (int)count; i++)
         prepare_ray(prepared, rays, i);
 }
+#endif
 
+#ifndef BRUTE_FORCE_ONLY
 // The nearest hits of the first `listed` paths in the list, which are some of `count` traced paths.
 STAGE void interleaved_nearest(const Block *block, uint count, uint listed) {
     __local float *prepared = PLANES(block->memory, PREPARED);

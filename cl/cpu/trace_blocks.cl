@@ -25,6 +25,7 @@
 #include "path/sample_lights.cl"
 #include "path/shade_medium.cl"
 #include "cpu/packets.cl"
+#include "cpu/meet_lights.cl"
 #include "path/shade.cl"
 #ifdef AOVS
 #include "path/write_aovs.cl"
@@ -82,6 +83,10 @@ STAGE uint compact_live(const Block *block, uint count, Subset *kinds) {
             compact_plane(to->rays + p * BLOCK_STRIDE + live, from->rays + p * BLOCK_STRIDE, &kinds[kind]);
         for (uint p = 0; p <= LAST_CARRIED; p++)
             compact_plane(to->paths + p * BLOCK_STRIDE + live, from->paths + p * BLOCK_STRIDE, &kinds[kind]);
+#ifdef LIGHT_TREE
+        compact_plane(to->paths + PATH_NORMAL * BLOCK_STRIDE + live, from->paths + PATH_NORMAL * BLOCK_STRIDE,
+                      &kinds[kind]);
+#endif
         live += kinds[kind].count;
     }
     return live;
@@ -119,6 +124,7 @@ STAGE uint trace_nearest(const Block *block, uint count, bool from_camera) {
 // Whether a ray ends on a light.
 INLINE uint is_light_hit(uint object) { return ((object & LIGHT_HIT) != 0u) & (object != NO_INDEX); }
 
+#ifndef LIGHT_TREE
 // One light after the other, for all rays: those that meet it before all else end there.
 STAGE void meet_lights(const Block *block, const BlockRay *ray) {
     const State *traced = &block->traced;
@@ -142,6 +148,7 @@ STAGE void meet_lights(const Block *block, const BlockRay *ray) {
         }
     }
 }
+#endif
 #endif
 
 // Sorts paths by what their rays have met.
@@ -179,7 +186,9 @@ INLINE void trace_rays(const Block *block, BlockRay *ray) {
 #ifdef CUTOUTS
     pass_cutouts(block, ray->count);
 #endif
-#ifdef SHAPED_LIGHTS
+#if defined(SHAPED_LIGHTS) && defined(LIGHT_TREE)
+    meet_tree_lights(block, ray->count, ray->number == 0);
+#elif defined(SHAPED_LIGHTS)
     meet_lights(block, ray);
 #endif
     classify_hits(block, ray);
@@ -212,6 +221,9 @@ STAGE void shade_lights(const Block *block, const BlockRay *ray) {
     __local uint *list = UINT_PLANES(block->memory, LIST);
     const uint count = ray->lights.count;
     list_subset(list, &ray->lights, 0);
+#ifdef LIGHT_TREE
+    weigh_tree_lights(block, count);
+#endif
     LANES
     for (int i = 0; i < (int)count; i++) {
         const RawHit hit = load_raw_hit(block, list[i]);
@@ -261,6 +273,10 @@ STAGE uint compact_hits(const Block *block, const BlockRay *ray) {
         compact_hit_plane(block, to->rays + p * BLOCK_STRIDE, from->rays + p * BLOCK_STRIDE, ray);
     for (uint p = 0; p <= LAST_CARRIED; p++)
         compact_hit_plane(block, to->paths + p * BLOCK_STRIDE, from->paths + p * BLOCK_STRIDE, ray);
+#ifdef LIGHT_TREE
+    compact_hit_plane(block, to->paths + PATH_NORMAL * BLOCK_STRIDE, from->paths + PATH_NORMAL * BLOCK_STRIDE,
+                      ray);
+#endif
     for (uint p = 0; p < RAW_HIT_PLANES; p++)
         compact_hit_plane(block, hits + p * BLOCK_STRIDE, hits + p * BLOCK_STRIDE, ray);
 #ifdef MEDIA
@@ -304,6 +320,10 @@ STAGE void write_aovs(const Block *block, const BlockRay *ray) {
         write_aovs_path(&block->shading, &block->state, i, path_buffer, stride,
                         first + load_result(&block->state, i));
 }
+#endif
+
+#ifdef LIGHT_TREE
+STAGE void choose_lights(const Block *block, const BlockRay *ray) { choose_block_lights(block, ray->count); }
 #endif
 
 #if defined(CHANGES) && (defined(TRIANGLE_LIGHTS) || defined(SHAPED_LIGHTS))
@@ -406,7 +426,7 @@ STAGE void touch_shadow_rays(const Block *block, const BlockRay *ray) {
 }
 #endif
 
-#ifdef SHAPED_LIGHTS
+#if defined(SHAPED_LIGHTS) && !defined(LIGHT_TREE)
 // Drops the shadow rays that a light is in the way of, as surfaces are.
 STAGE void shade_by_lights(const Block *block, const BlockRay *ray) {
     const State *state = &block->state;
@@ -429,7 +449,9 @@ STAGE void shade_by_lights(const Block *block, const BlockRay *ray) {
 // Traces the shadow rays that paths ask for, and adds what they bring.
 STAGE void trace_shadows(const Block *block, const BlockRay *ray) {
     const uint count = ray->count;
-#ifdef SHAPED_LIGHTS
+#if defined(SHAPED_LIGHTS) && defined(LIGHT_TREE)
+    shade_by_tree_lights(block, count);
+#elif defined(SHAPED_LIGHTS)
     shade_by_lights(block, ray);
 #endif
 #ifdef CUTOUTS

@@ -1,7 +1,7 @@
 #include "path/coverage.cl"
 #include "path/tangents.cl"
 #include "path/trace.cl"
-#include "path/shade_light.cl"
+#include "path/light_search.cl"
 
 #if defined(CUTOUTS) || defined(SHAPED_LIGHTS) || defined(TANGENTS)
 #define NEEDS_SHADING
@@ -40,7 +40,14 @@ __kernel __attribute__((vec_type_hint(float8))) void intersect(LAUNCH_PARAMETERS
 #ifdef SHAPED_LIGHTS
     const Emitters emitters = {EMITTERS_ARGUMENTS};
     float distance = met ? hit.distance : INFINITY;
+#ifdef LIGHT_TREE
+    const uint light = nearest_tree_light(&params, &emitters, &state, path, &distance);
+    if (light != NO_INDEX)
+        weigh_met_shaped_light(&params, &emitters, &state, path, load_ray(rays, state.stride, path).origin,
+                               light);
+#else
     const uint light = nearest_light(&params, &emitters, &state, path, &distance);
+#endif
     if (light != NO_INDEX) {
         shade_light_path(&params, &shading, &emitters, &state, path, params.first_path + path, light,
                          distance);

@@ -1,5 +1,6 @@
 #include "path/state.cl"
 #include "scene/light.cl"
+#include "path/chosen_light.cl"
 
 #ifdef LIGHT_SAMPLING
 // Chooses a light for a path that stands on a surface: a direction, the radiance that comes along it when
@@ -13,7 +14,12 @@ INLINE void sample_lights_path(const Params *params, const Shading *shading, con
     Uniform2 uv = uniform_2d(seed, p.sample, PAIR_LIGHT(p.ray));
     float choice = uniform_2d(seed, p.sample, PAIR_CHOICE(p.ray)).v;
     Vec3 step = scale(surface.offset, surface.geometric);
+#ifdef LIGHT_TREE
+    LightSample light = sample_tree_light(params, shading, emitters, surface.position, step, uv, choice,
+                                          load_chosen_light(state, path));
+#else
     LightSample light = sample_light(params, shading, emitters, surface.position, step, uv, choice);
+#endif
     store_light_sample(state, path, &light);
 }
 

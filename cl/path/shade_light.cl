@@ -31,6 +31,7 @@ INLINE void shade_sun_path(const Params *params, const Shading *shading, const E
     accumulate(state, result, CLAMPED(params, mul(throughput, radiance), finds_indirect(&p)));
 }
 
+#ifndef LIGHT_TREE
 // The light that a path's ray meets before `*distance`, with the distance to it; NO_INDEX: it meets none.
 INLINE uint nearest_light(const Params *params, const Emitters *emitters, const State *state, uint path,
                           float *distance) {
@@ -47,4 +48,5 @@ INLINE uint nearest_light(const Params *params, const Emitters *emitters, const 
     }
     return nearest;
 }
+#endif
 #endif

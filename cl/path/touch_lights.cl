@@ -1,5 +1,6 @@
 #include "path/changes.cl"
 #include "scene/light.cl"
+#include "path/chosen_light.cl"
 
 // 1 where a path that has hit a surface asks for a light that differs. This is asked before the path is
 // shaded.
@@ -8,7 +9,12 @@ INLINE uint asks_for_changed_light(const Params *params, const Shading *shading,
     Path p = load_path(state, path);
     __global const Material *material = &shading->materials[load_surface(state, path).material];
     uint seed = pixel_seed(p.pixel, params->seed);
+#ifdef LIGHT_TREE
+    uint changed = is_changed_light(params, emitters, load_chosen_light(state, path));
+#else
     float choice = uniform_2d(seed, p.sample, PAIR_CHOICE(p.ray)).v;
+    uint changed = chooses_changed_light(params, emitters, choice);
+#endif
     // As in shade_medium: only smooth boundaries need no light.
     int opaque = uniform_2d(seed, p.sample, PAIR_LUCK(p.ray)).v >= material->transmission;
 #if TEXTURED(TRANSMISSION)
@@ -16,7 +22,7 @@ INLINE uint asks_for_changed_light(const Params *params, const Shading *shading,
 #endif
     int rough = material->roughness * material->roughness > MIN_ALPHA;
     int asks = (p.bounces <= params->max_bounces) & (opaque | rough);
-    return chooses_changed_light(params, emitters, choice) & (uint)asks;
+    return changed & (uint)asks;
 }
 
 #ifndef BLOCKS

@@ -1,8 +1,6 @@
 #include "path/coverage.cl"
 #include "path/trace.cl"
-#ifdef SHAPED_LIGHTS
-#include "scene/shaped_light.cl"
-#endif
+#include "path/light_search.cl"
 
 // Traces shadow rays, and adds the radiance of those that nothing is in the way of to what paths have
 // gathered. The hint keeps compilers from making SIMD lanes of work-items, as Intel's would: the lanes are
@@ -18,9 +16,15 @@ __kernel __attribute__((vec_type_hint(float8))) void trace_shadow(LAUNCH_PARAMET
     const Geometry geometry = {GEOMETRY_ARGUMENTS};
 #ifdef SHAPED_LIGHTS
     const Emitters emitters = {EMITTERS_ARGUMENTS};
-    if (any_light_shades(&params, &emitters, load_ray(shadows, state.stride, path),
-                         shadows[SHADOW_DISTANCE * state.stride + path]))
+    const Ray shadow = load_ray(shadows, state.stride, path);
+    const float limit = shadows[SHADOW_DISTANCE * state.stride + path];
+#ifdef LIGHT_TREE
+    if (any_tree_light_shades(&params, &emitters, shadow, limit))
         return;
+#else
+    if (any_light_shades(&params, &emitters, shadow, limit))
+        return;
+#endif
 #endif
 #ifdef CUTOUTS
     const Shading shading = {SHADING_ARGUMENTS};

@@ -5,6 +5,9 @@
 #ifdef SHAPED_LIGHTS
 #include "scene/shaped_light.cl"
 #endif
+#ifdef LIGHT_TREE
+#include "scene/light_tree.cl"
+#endif
 
 // Emitters: triangles, lights that are objects of their own, and the environment. Which exist is known when a
 // kernel is built (ENVIRONMENT_IMAGE, TRIANGLE_LIGHTS, SHAPED_LIGHTS), so that a scene does not pay for
@@ -149,16 +152,15 @@ INLINE Uvs light_uvs(__global const float *lights, uint stride, uint light, floa
 }
 #endif
 
-// `choice` selects the triangle, `uv` the point on it. Direction, distance and density are those from where
+// `uv` selects the point on the triangle number `light`. Direction, distance and density are those from where
 // the shadow ray starts. It ends before the point by what rounding may put between that and the light's
 // surface, which would be in its way. That is the more the flatter the light is seen, but never so much that
 // the ray passes by what stands before the light.
-INLINE LightSample sample_triangle_light(const Params *params, const Shading *shading,
+INLINE LightSample sample_triangle_point(const Params *params, const Shading *shading,
                                          const Emitters *emitters, Vec3 position, Vec3 step, Uniform2 uv,
-                                         float choice) {
+                                         uint light) {
     uint stride = params->light_count;
     __global const float *lights = emitters->lights;
-    uint light = chosen_triangle(params, emitters, choice);
     float b1, b2;
     sample_triangle(uv.u, uv.v, &b1, &b2);
     Vec3 vertex = light_vec3(lights + LIGHT_VERTEX_X * stride, stride, light);
@@ -186,6 +188,48 @@ INLINE LightSample sample_triangle_light(const Params *params, const Shading *sh
     result.radiance = mul(result.radiance, emission_texel(shading, texture, &uvs));
 #endif
     result.pdf = valid ? lights[LIGHT_PDF_AREA * stride + light] * squared * inverse_facing : 0.0f;
+    return result;
+}
+
+// `choice` selects the triangle.
+INLINE LightSample sample_triangle_light(const Params *params, const Shading *shading,
+                                         const Emitters *emitters, Vec3 position, Vec3 step, Uniform2 uv,
+                                         float choice) {
+    uint light = chosen_triangle(params, emitters, choice);
+    return sample_triangle_point(params, shading, emitters, position, step, uv, light);
+}
+#endif
+
+#if defined(SHAPED_LIGHTS) || defined(LIGHT_TREE)
+INLINE LightSample select_sample(int condition, LightSample a, LightSample b) {
+    LightSample result;
+    result.direction = select(condition, a.direction, b.direction);
+    result.distance = condition ? a.distance : b.distance;
+    result.radiance = select(condition, a.radiance, b.radiance);
+    result.pdf = condition ? a.pdf : b.pdf;
+    return result;
+}
+#endif
+
+#ifdef LIGHT_TREE
+// Where a light that the tree has chosen stands in its table, and all bits where it is of that kind. By
+// arithmetic, as INDEX_OR_0. Elsewhere the place is 0.
+typedef struct {
+    uint place, mask;
+} TablePlace;
+
+INLINE TablePlace place_of_shaped(const Params *params, uint number) {
+    TablePlace result;
+    result.mask = (0u - ((INDEX_OR_0(number) - params->shaped_count) >> 31)) & INDEX_MASK(number);
+    result.place = number & result.mask;
+    return result;
+}
+
+INLINE TablePlace place_of_triangle(const Params *params, uint number) {
+    TablePlace result;
+    result.mask = (((INDEX_OR_0(number) - params->shaped_count) >> 31) - 1u) & INDEX_MASK(number);
+    // Scratch paths of a wavefront hold any number.
+    result.place = MIN((number - params->shaped_count) & result.mask, params->light_count - 1u);
     return result;
 }
 #endif
@@ -218,15 +262,7 @@ INLINE float choice_among_triangles(const Params *params, float choice) {
     return choice_within(choice, first, 1.0f - first);
 }
 
-INLINE LightSample select_sample(int condition, LightSample a, LightSample b) {
-    LightSample result;
-    result.direction = select(condition, a.direction, b.direction);
-    result.distance = condition ? a.distance : b.distance;
-    result.radiance = select(condition, a.radiance, b.radiance);
-    result.pdf = condition ? a.pdf : b.pdf;
-    return result;
-}
-
+#ifndef LIGHT_TREE
 // The choices begin with those of the environment; then come lights that are objects of their own, and
 // triangles.
 INLINE LightSample sample_any_light(const Params *params, const Shading *shading, const Emitters *emitters,
@@ -246,8 +282,57 @@ INLINE LightSample sample_any_light(const Params *params, const Shading *shading
     return result;
 }
 #endif
+#endif
 
-#ifdef LIGHT_SAMPLING
+#ifdef LIGHT_TREE
+// One direction towards the light that the tree has chosen; where the choice has turned elsewhere, to a sun
+// or to the environment, whose choices come first.
+INLINE LightSample sample_tree_light(const Params *params, const Shading *shading, const Emitters *emitters,
+                                     Vec3 position, Vec3 step, Uniform2 uv, float choice,
+                                     ChosenLight chosen) {
+    float chance = chosen.chance * params->tree_probability;
+    LightSample result;
+#ifdef SHAPED_LIGHTS
+    TablePlace shaped = place_of_shaped(params, chosen.number);
+    uint far_mask = ~INDEX_MASK(chosen.number);
+    uint sun = chosen_shaped_light(params, emitters, choice_among_shaped(params, choice));
+    ShapedLight light = load_shaped_light(params, emitters, shaped.place | (sun & far_mask));
+    light.probability *= far_mask ? 1.0f : chance;
+    result = sample_shape(light, position, step, uv);
+#endif
+#ifdef TRIANGLE_LIGHTS
+    TablePlace place = place_of_triangle(params, chosen.number);
+    LightSample triangle = sample_triangle_point(params, shading, emitters, position, step, uv, place.place);
+    triangle.pdf *= chance;
+#ifdef SHAPED_LIGHTS
+    result = select_sample(place.mask != 0u, triangle, result);
+#else
+    result = triangle;
+#endif
+#endif
+#ifdef ENVIRONMENT_IMAGE
+    LightSample far = sample_environment(params, emitters, uv);
+    result = select_sample(choice < params->environment_probability, far, result);
+#endif
+    return result;
+}
+
+// Whether the light that the tree has chosen differs between two scenes.
+INLINE uint is_changed_light(const Params *params, const Emitters *emitters, ChosenLight chosen) {
+    uint changed = 0u;
+#ifdef SHAPED_LIGHTS
+    TablePlace shaped = place_of_shaped(params, chosen.number);
+    changed |= shaped.mask & (uint)((shaped_flags(params, emitters, shaped.place) & SHAPED_CHANGED) != 0u);
+#endif
+#ifdef TRIANGLE_LIGHTS
+    TablePlace triangle = place_of_triangle(params, chosen.number);
+    changed |= triangle.mask & (uint)((light_flags(params, emitters, triangle.place) & LIGHT_CHANGED) != 0u);
+#endif
+    return changed;
+}
+#endif
+
+#if defined(LIGHT_SAMPLING) && !defined(LIGHT_TREE)
 // One direction towards a light, chosen by power among triangles and the environment.
 // `step` is how far off the surface at `position` rays start, along its normal.
 INLINE LightSample sample_light(const Params *params, const Shading *shading, const Emitters *emitters,
@@ -274,6 +359,7 @@ INLINE LightSample sample_light(const Params *params, const Shading *shading, co
 }
 #endif
 
+#ifndef LIGHT_TREE
 // Whether `choice` leads to a light that differs between two scenes.
 INLINE uint chooses_changed_light(const Params *params, const Emitters *emitters, float choice) {
 #if defined(SHAPED_LIGHTS)
@@ -296,6 +382,7 @@ INLINE uint chooses_changed_light(const Params *params, const Emitters *emitters
     return 0u;
 #endif
 }
+#endif
 
 // What arrives of the radiance `emission` of a surface at the origin of the ray that has met it, weighted
 // against light sampling, which would have found the point with the area density `density`. `facing` is the

@@ -17,42 +17,62 @@ typedef struct {
     float cap, cone_outer, cone_scale, probability;
 } ShapedLight;
 
-INLINE Vec3 shaped_vec3(__global const float *plane, uint stride, uint i) {
-    return vec3(plane[i], plane[stride + i], plane[2 * stride + i]);
+// A number of a light: in planes, as lanes read neighbours from them; or, with the light tree, where
+// neighbours have different lights, all of a light in a row.
+#ifdef LIGHT_TREE
+#define SHAPED_PLACE(params, plane, light) (SHAPED_PLANES * (light) + (plane))
+#else
+#define SHAPED_PLACE(params, plane, light) ((plane) * (params)->shaped_count + (light))
+#endif
+
+INLINE float shaped_number(const Params *params, const Emitters *emitters, uint plane, uint light) {
+    return emitters->shaped_lights[SHAPED_PLACE(params, plane, light)];
 }
 
-INLINE ShapedLight load_shaped_light(const Params *params, const Emitters *emitters, uint i) {
-    uint stride = params->shaped_count;
-    __global const float *planes = emitters->shaped_lights;
-    ShapedLight light;
-    light.flags = ((__global const uint *)planes)[SHAPED_FLAGS * stride + i];
-    light.center = shaped_vec3(planes + SHAPED_CENTER_X * stride, stride, i);
-    light.x = shaped_vec3(planes + SHAPED_X_X * stride, stride, i);
-    light.y = shaped_vec3(planes + SHAPED_Y_X * stride, stride, i);
-    light.z = cross(light.x, light.y);
-    light.half_x = planes[SHAPED_HALF_X * stride + i];
-    light.half_y = planes[SHAPED_HALF_Y * stride + i];
-    light.emission = shaped_vec3(planes + SHAPED_EMISSION_R * stride, stride, i);
-    light.cap = planes[SHAPED_CAP * stride + i];
-    light.cone_outer = planes[SHAPED_CONE_OUTER * stride + i];
-    light.cone_scale = planes[SHAPED_CONE_SCALE * stride + i];
-    light.probability = planes[SHAPED_PROBABILITY * stride + i];
-    return light;
+INLINE uint shaped_bits(const Params *params, const Emitters *emitters, uint plane, uint light) {
+    return ((__global const uint *)emitters->shaped_lights)[SHAPED_PLACE(params, plane, light)];
 }
 
-// The light that `choice` selects among them (Walker's alias method).
-INLINE uint chosen_shaped_light(const Params *params, const Emitters *emitters, float choice) {
-    uint stride = params->shaped_count;
-    __global const float *planes = emitters->shaped_lights;
-    float scaled_choice = choice * (float)stride;
-    uint cell = MIN((uint)scaled_choice, stride - 1u);
-    uint alias = ((__global const uint *)planes)[SHAPED_ALIAS * stride + cell];
-    return scaled_choice - (float)cell < planes[SHAPED_ALIAS_PROBABILITY * stride + cell] ? cell : alias;
+INLINE Vec3 shaped_vec3(const Params *params, const Emitters *emitters, uint plane, uint light) {
+    return vec3(shaped_number(params, emitters, plane, light),
+                shaped_number(params, emitters, plane + 1u, light),
+                shaped_number(params, emitters, plane + 2u, light));
 }
 
 // Of ShapedFlag.
 INLINE uint shaped_flags(const Params *params, const Emitters *emitters, uint light) {
-    return ((__global const uint *)emitters->shaped_lights)[SHAPED_FLAGS * params->shaped_count + light];
+    return shaped_bits(params, emitters, SHAPED_FLAGS, light);
+}
+
+INLINE ShapedLight load_shaped_light(const Params *params, const Emitters *emitters, uint i) {
+    ShapedLight light;
+    light.flags = shaped_flags(params, emitters, i);
+    light.center = shaped_vec3(params, emitters, SHAPED_CENTER_X, i);
+    light.x = shaped_vec3(params, emitters, SHAPED_X_X, i);
+    light.y = shaped_vec3(params, emitters, SHAPED_Y_X, i);
+    light.z = cross(light.x, light.y);
+    light.half_x = shaped_number(params, emitters, SHAPED_HALF_X, i);
+    light.half_y = shaped_number(params, emitters, SHAPED_HALF_Y, i);
+    light.emission = shaped_vec3(params, emitters, SHAPED_EMISSION_R, i);
+    light.cap = shaped_number(params, emitters, SHAPED_CAP, i);
+    light.cone_outer = shaped_number(params, emitters, SHAPED_CONE_OUTER, i);
+    light.cone_scale = shaped_number(params, emitters, SHAPED_CONE_SCALE, i);
+    light.probability = shaped_number(params, emitters, SHAPED_PROBABILITY, i);
+    return light;
+}
+
+// The light that `choice` selects among them (Walker's alias method); with the light tree, among the suns.
+INLINE uint chosen_shaped_light(const Params *params, const Emitters *emitters, float choice) {
+#ifdef LIGHT_TREE
+    uint count = params->sun_count;
+#else
+    uint count = params->shaped_count;
+#endif
+    float scaled_choice = choice * (float)count;
+    uint cell = MIN((uint)scaled_choice, count - 1u);
+    uint alias = shaped_bits(params, emitters, SHAPED_ALIAS, cell);
+    float own = shaped_number(params, emitters, SHAPED_ALIAS_PROBABILITY, cell);
+    return scaled_choice - (float)cell < own ? cell : alias;
 }
 
 INLINE int has_flag(const ShapedLight *light, uint flag) { return (light->flags & flag) != 0u; }
@@ -151,11 +171,8 @@ INLINE float shaped_light_pdf(const ShapedLight *light, Vec3 to_center, Vec3 dir
 // Of a distance to a light, by how much surfaces in its own plane count as behind it.
 #define LIGHT_AHEAD 1e-6f
 
-// `choice` selects the light, `uv` the direction. Where only light sampling can find the light, its weight is
-// made 1 by SURE_PDF.
-INLINE LightSample sample_shaped_light(const Params *params, const Emitters *emitters, Vec3 position,
-                                       Vec3 step, Uniform2 uv, float choice) {
-    ShapedLight light = load_shaped_light(params, emitters, chosen_shaped_light(params, emitters, choice));
+// `uv` selects the direction. Where only light sampling can find the light, its weight is made 1 by SURE_PDF.
+INLINE LightSample sample_shape(ShapedLight light, Vec3 position, Vec3 step, Uniform2 uv) {
     int sun = has_flag(&light, SHAPED_SUN), ball = has_flag(&light, SHAPED_BALL);
     int point = has_flag(&light, SHAPED_POINT);
     Vec3 origin = start_towards(light.center, position, step);
@@ -204,6 +221,13 @@ INLINE LightSample sample_shaped_light(const Params *params, const Emitters *emi
     result.distance = sun ? INFINITY : distance * (1.0f - LIGHT_AHEAD);
     result.distance = has_flag(&light, SHAPED_SHADOWLESS) ? 0.0f : result.distance;
     return result;
+}
+
+// `choice` selects the light, `uv` the direction.
+INLINE LightSample sample_shaped_light(const Params *params, const Emitters *emitters, Vec3 position,
+                                       Vec3 step, Uniform2 uv, float choice) {
+    ShapedLight light = load_shaped_light(params, emitters, chosen_shaped_light(params, emitters, choice));
+    return sample_shape(light, position, step, uv);
 }
 
 // Whether rays of which `bsdf_pdf` is the density can meet the light: 0 is that of camera rays, and of those

@@ -140,6 +140,10 @@ EMITTERS = Group(
         _table("marginal", "float", "cumulative distribution of its rows, height + 1"),
         _table("conditional", "float", "of the pixels of each row, width + 1 each"),
         _table("texel_pdf", "float", "density over the unit square of the image, per texel"),
+        _table("light_nodes", "LightNode", "the light tree"),
+        _table("light_boxes", "Node", "the same nodes, with boxes around those lights that rays may meet"),
+        _table("first_trail", "uint", "of every object, its first face in the next table, or NO_INDEX"),
+        _table("face_trails", "uint", "the ways of emissive triangles in the light tree: FACE_TRAIL_SIZE"),
     ),
 )
 
@@ -494,6 +498,7 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     "generate": (LAUNCH, SLOTS, PLACES, PATH_STATE),
     "compact": (LAUNCH, LIST, PATH_STATE, COMPACTION),
     "intersect": (LAUNCH, LIST, GEOMETRY, SHADING, EMITTERS, PATH_STATE),
+    "choose_lights": (LAUNCH, LIST, SHADING, EMITTERS, PATH_STATE),
     "sample_lights": (LAUNCH, LIST, SHADING, EMITTERS, PATH_STATE),
     "shade": (LAUNCH, LIST, SHADING, PATH_STATE),
     "shade_medium": (LAUNCH, LIST, SHADING, PATH_STATE, COUNTERS),

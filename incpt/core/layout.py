@@ -66,6 +66,13 @@ MEDIUM_STACK_SIZE = 4
 MEDIUM_NONE = 0xFFFF
 """An unused place in the 16-bit medium stack; so at most 65,535 materials."""
 
+LIGHT_TREE_BITS = 3
+"""Bits of the trail of a light for each level of the light tree, of which BVH_WIDTH is the base."""
+
+FACE_TRAIL_SIZE = 2
+"""Words of a face in the table of trails: its trail, and 1 over its chance by power alone, as a float, 0
+where it is no light."""
+
 ALBEDO_TABLE_SIZE = 32
 """Resolution of the specular albedo table in cosine and in roughness (see `albedo.py`)."""
 LAYER_SIZE = ALBEDO_TABLE_SIZE + 4
@@ -166,6 +173,8 @@ class PathPlane(IntEnum):
     MEDIUM_0 and MEDIUM_1 hold the stack of enclosing dielectrics, four 16-bit material indices.
     RESULT is the place of the path's sum in the planes of radiance. Only blocks of paths use it, because a
     path of a wavefront stays in its place.
+    NORMAL is that of the surface that the current ray comes from, packed (scene/light_tree.cl), NO_INDEX
+    where light is chosen from both sides. Only scenes with a light tree have it.
     """
 
     THROUGHPUT_R = 0
@@ -179,6 +188,7 @@ class PathPlane(IntEnum):
     MEDIUM_0 = 8
     MEDIUM_1 = 9
     CLASS = 10
+    NORMAL = 11
 
 
 class ShadowPlane(IntEnum):
@@ -264,7 +274,8 @@ class ShapedPlane(IntEnum):
     angular radius of a sun. What is emitted falls off with the cosine of the angle to the axis, to 0 at
     CONE_OUTER; CONE_SCALE is 1 over how much nearer to 1 that cosine is where it begins to. PROBABILITY is
     that of being chosen among all lights; ALIAS (uint) and ALIAS_PROBABILITY are the table over these lights.
-    FLAGS are of ShapedFlag (uint).
+    FLAGS are of ShapedFlag (uint). With a light tree, the chance and the table are those of suns alone, and
+    TRAIL (uint) leads to each other light, whose PROBABILITY is 1.
     """
 
     CENTER_X = 0
@@ -288,6 +299,7 @@ class ShapedPlane(IntEnum):
     ALIAS_PROBABILITY = 18
     ALIAS = 19
     FLAGS = 20
+    TRAIL = 21
 
 
 class ShapedFlag(IntFlag):
@@ -303,6 +315,30 @@ class ShapedFlag(IntFlag):
     POINT = 64
     HIDDEN = 128
     SHADOWLESS = 256
+
+
+class LightNodePlane(IntEnum):
+    """Planes of the children of a node of the light tree: bounds of where the lights of each are and where
+    they shine to.
+
+    CENTER and RADIUS are of a ball around them, metres. POWER is their share of that of
+    all, 0 for an unused child. Their normals are within an angle, the spread, around AXIS, which has unit
+    length; a light emits more than nothing within another angle of its normal, the falloff. FALLOFF_SCALE is
+    1 over 1 - COS_FALLOFF.
+    """
+
+    CENTER_X = 0
+    CENTER_Y = 1
+    CENTER_Z = 2
+    RADIUS = 3
+    POWER = 4
+    AXIS_X = 5
+    AXIS_Y = 6
+    AXIS_Z = 7
+    COS_SPREAD = 8
+    SIN_SPREAD = 9
+    COS_FALLOFF = 10
+    FALLOFF_SCALE = 11
 
 
 class SamplePlane(IntEnum):
@@ -606,6 +642,11 @@ MEDIUM_LOW = Bits(0, 16)
 MEDIUM_HIGH = Bits(16, 16)
 """Of PathPlane.MEDIUM_0 and MEDIUM_1: the entry below it."""
 
+NORMAL_U = Bits(0, 16)
+"""Of PathPlane.NORMAL: the first coordinate of the octahedral map."""
+NORMAL_V = Bits(16, 16)
+"""Of PathPlane.NORMAL: the second one."""
+
 PLACE_LANE = Bits(0, 3)
 """Of the place of a triangle: its lane in its pack."""
 PLACE_PACK = Bits(3, 27)
@@ -773,6 +814,19 @@ ATTRIBUTES = _packed(
     ]
 )
 
+LIGHT_NODE = _packed(
+    [
+        # Of the light tree: planes of eight children, see LightNodePlane.
+        ("planes", np.float32, (len(LightNodePlane), BVH_WIDTH)),
+        # Another node, or NODE_LEAF | the number of a light: those of ShapedPlane first, then the triangles
+        # of LightPlane. NODE_EMPTY: there is no child.
+        ("child", np.uint32, (BVH_WIDTH,)),
+        ("last", np.uint32),  # the last child that there is
+        ("directed", np.uint32),  # 1: some of the children do not shine everywhere
+        ("unused", np.uint32, (6,)),  # planes begin where vectors may
+    ]
+)
+
 SLOT = _packed(
     [
         # The slots that hold repetitions of one tile stand next to each other and form a group; paths of a
@@ -826,7 +880,9 @@ PARAMS = _packed(
         ("environment_probability", np.float32),  # of sampling the environment instead of a triangle
         ("shaped_count", np.uint32),  # lights that are objects of their own
         ("sun_count", np.uint32),  # suns among them, which come first
-        ("shaped_probability", np.float32),  # of sampling one of them
+        ("shaped_probability", np.float32),  # of sampling one of them; with a light tree, of the suns
+        ("tree_probability", np.float32),  # of sampling a light of the light tree
+        ("light_levels", np.uint32),  # of the light tree
         ("environment_color", np.float32, (3,)),  # radiance; times the image
         ("environment_width", np.uint32),
         ("environment_height", np.uint32),
@@ -869,6 +925,7 @@ STRUCTS: dict[str, np.dtype[np.void]] = {
     "Material": MATERIAL,
     "Texture": TEXTURE,
     "Attributes": ATTRIBUTES,
+    "LightNode": LIGHT_NODE,
     "Slot": SLOT,
     "Camera": CAMERA,
     "Params": PARAMS,
@@ -929,6 +986,7 @@ def c_header() -> str:
         (LightFlag, "LIGHT"),
         (ShapedPlane, "SHAPED"),
         (ShapedFlag, "SHAPED"),
+        (LightNodePlane, "LIGHT_NODE"),
         (SamplePlane, "SAMPLE"),
         (PairPlane, "PAIR"),
         (CellSum, "CELL_SUM"),

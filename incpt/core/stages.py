@@ -28,6 +28,8 @@ class When(Flag):
     """Not only the environment is among them."""
     SHAPED_LIGHTS = auto()
     """There are lights that are objects of their own, which rays may meet."""
+    LIGHT_TREE = auto()
+    """Lights are so many that they are chosen, and met, by a tree."""
     MEDIA = auto()
     """There are materials that let light through."""
     AOVS = auto()
@@ -77,6 +79,8 @@ STAGES = (
     Stage("shade_miss", "shade_misses", PathList.MISS, When.SKY),
     Stage(None, "setup_surfaces", PathList.LIVE),
     Stage("write_aovs", "write_aovs", PathList.LIVE, When.AOVS | When.CAMERA_RAY),
+    Stage("choose_lights", "choose_lights", PathList.SURFACE, When.LIGHT_TREE),
+    Stage("choose_lights", None, PathList.MEDIUM, When.LIGHT_TREE | When.MEDIA),
     Stage("touch_lights", "touch_lights", PathList.SURFACE, _TOUCHES_LIGHTS | When.GOES_ON),
     Stage("touch_lights", None, PathList.MEDIUM, _TOUCHES_LIGHTS | When.MEDIA),
     Stage("sample_lights", None, PathList.SURFACE, When.LIGHTS | When.GOES_ON),
@@ -92,11 +96,14 @@ STAGES = (
 )  # fmt: skip
 """All stages of a ray, in order. They lie between `generate`, which starts paths, and the next ray."""
 
-_BY_FEATURES = When.LIGHTS | When.LAMPS | When.SHAPED_LIGHTS | When.MEDIA | When.AOVS | When.CHANGES
+_BY_FEATURES = (
+    When.LIGHTS | When.LAMPS | When.SHAPED_LIGHTS | When.LIGHT_TREE | When.MEDIA | When.AOVS | When.CHANGES
+)
 _HOLDS = {
     "ENVIRONMENT_IMAGE": When.LIGHTS,
     "TRIANGLE_LIGHTS": When.LIGHTS | When.LAMPS,
     "SHAPED_LIGHTS": When.LIGHTS | When.LAMPS | When.SHAPED_LIGHTS,
+    "LIGHT_TREE": When.LIGHT_TREE,
     "MEDIA": When.MEDIA | When.GOES_ON,
     "AOVS": When.AOVS,
     "CHANGES": When.CHANGES,

@@ -36,6 +36,7 @@ FEATURES = {
     "SUN": "The image is a sky, in which the sun shines.",
     "TRIANGLE_LIGHTS": "There are emissive triangles, of which lights are sampled.",
     "SHAPED_LIGHTS": "There are lights that are objects of their own.",
+    "LIGHT_TREE": "Lights are so many that they are chosen, and met, by a tree.",
     "MEDIA": "There are materials that let light through.",
     "SMOOTH_MEDIA": "No material that lets light through is rough.",
     "CLEAR_MEDIA": "No material that lets light through absorbs any.",

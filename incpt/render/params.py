@@ -71,6 +71,10 @@ def launch_params(params: npt.NDArray[np.void], tables: SceneTables) -> npt.NDAr
     params["light_count"] = tables.light_count
     params["shaped_count"], params["sun_count"] = shaped.count, shaped.sun_count
     params["shaped_probability"] = shaped.probability
+    params["tree_probability"], params["light_levels"] = (
+        tables.lights.tree.probability,
+        tables.lights.tree.levels,
+    )
     params["environment_probability"] = tables.environment_probability
     params["environment_color"] = tables.environment_radiance
     if environment.picture is not None:

@@ -40,23 +40,24 @@ _PLANES = {
 }
 _CLASSES = {path_list: PathClass[path_list.name] for path_list in PathList}
 """Which paths are in which list."""
-_SHAPED, _CLAMP = "SHAPED_LIGHTS", "CLAMP_INDIRECT"
-_LIGHTS = ("ENVIRONMENT_IMAGE", "SUN", "TRIANGLE_LIGHTS", _SHAPED)
+_SHAPED, _TREE, _CLAMP = "SHAPED_LIGHTS", "LIGHT_TREE", "CLAMP_INDIRECT"
+_LIGHTS = ("ENVIRONMENT_IMAGE", "SUN", "TRIANGLE_LIGHTS", _SHAPED, _TREE)
 _TEXTURES = ("TEXTURES", "VERTEX_COLORS")
 _MATERIALS = (*_TEXTURES, "TRAITS")
 _TRACED = (*_MATERIALS, "CUTOUTS")
 """Of first hits, which pass through lights."""
 _FEATURES: Mapping[str | None, tuple[str, ...]] = {
     "generate": ("LENS",),
-    "intersect": (*_TRACED, _SHAPED, "MEDIA", _CLAMP),
+    "intersect": (*_TRACED, _SHAPED, _TREE, "MEDIA", _CLAMP),
     "shade_miss": (*_LIGHTS, "MEDIA", _CLAMP),
+    "choose_lights": _LIGHTS,
     "sample_lights": (*_LIGHTS, *_TEXTURES),
     "touch_lights": (*_LIGHTS, *_TEXTURES),
     "shade_medium": (*_LIGHTS, *_MATERIALS, _CLAMP),
     "shade": (*_LIGHTS, *_MATERIALS, _CLAMP),
     "write_aovs": _MATERIALS,
     "first_hits": _MATERIALS,
-    "trace_shadow": (*_TEXTURES, "CUTOUTS", _SHAPED),
+    "trace_shadow": (*_TEXTURES, "CUTOUTS", _SHAPED, _TREE),
 }
 """The features of a scene without which a kernel would leave something out. Those that would only make it
 quicker, as they do blocks, would be more variants to build."""

@@ -202,7 +202,7 @@ class Light:
         """(3, 3) its axes x, y and z as rows, in world space, of unit length and at right angles."""
         return affine.rotation_matrix(self.transform.rotation).T
 
-    @property
+    @cached_property
     def half_size(self) -> tuple[float, float]:
         """Half of its extent along x and y, metres: for a ball its radius; 0 without a size."""
         if self.is_far or not self.has_size:
@@ -255,7 +255,7 @@ class Light:
             return math.pi * math.sin(math.radians(self.angle) / 2) ** 2
         return self.area if self.kind in ("rectangle", "disk") else self.area / 4
 
-    @property
+    @cached_property
     def emitted(self) -> Vector:
         """Radiance where rays can meet it; else the intensity of a point, W / sr, or the irradiance of a sun.
         Of a spot on its axis."""
@@ -267,14 +267,14 @@ class Light:
         r, g, b = (value * c for c in self.color)
         return r, g, b
 
-    @property
+    @cached_property
     def watts(self) -> Vector:
         """Its radiant power for each channel of its colour; that of a sun on a square metre that faces it."""
         factor = (self.face if self.has_size else 1) * (1 if self.is_far else self.solid_angle)
         r, g, b = (factor * e for e in self.emitted)
         return r, g, b
 
-    @property
+    @cached_property
     def is_emissive(self) -> bool:
         """Whether it is there and emits anything."""
         return self.visible and any(self.emitted)

@@ -12,7 +12,7 @@ where emission has a texture in one of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,11 +32,13 @@ from incpt.tables.shaped_lights import (
     ShapedLights,
     Shares,
     emissive_lights,
+    paired_tree_lights,
     shaped_planes,
     shares,
     weight,
 )
 from incpt.tables.textures import TextureTables
+from incpt.tables.tree_tables import Emitters, TreeBuffers, takes_tree
 
 _SAME_AREA = 1e-6
 """By how much, relatively, the areas of a triangle in both scenes may differ where it is one light: what
@@ -79,16 +81,63 @@ def paired_light_tables(
 ) -> tuple[LightTables, LightTables]:
     """The light tables of both scenes; `has_image` tells whether their environment has an image that shines.
     `textures` are those of both. Raises DeviceError."""
+    pairs, numbers = _light_pairs(old, new), (textures[0].emission_number, textures[1].emission_number)
+    textured = tuple(own.has(TextureSlot.EMISSION) for own in textures)
+    if _takes_tree(old, new, pairs):
+        triangles = paired_lights(old, new, 1.0, numbers)
+        suns = _sun_count(pairs)
+        if len(pairs) > suns or triangles[0].count:
+            return _paired_tree_tables(device, (old, new), pairs, triangles, has_image, textured)
     share, shaped = lights.share_of_triangles(has_image), (NO_SHAPED_LIGHTS, NO_SHAPED_LIGHTS)
-    pairs = _light_pairs(old, new)
     if pairs:
         chosen = shares(has_image, _triangle_power(old, new), [_common_weight(pair) for pair in pairs])
         share, shaped = chosen.triangles, paired_shaped_lights(pairs, chosen)
-    numbers = (textures[0].emission_number, textures[1].emission_number)
     triangles = paired_lights(old, new, share, numbers)
     first, second = (
-        LightTables.of(device, each, has_image, scene.objects, own.has(TextureSlot.EMISSION), beside)
-        for each, scene, own, beside in zip(triangles, (old, new), textures, shaped, strict=True)
+        LightTables.of(device, each, has_image, scene.objects, own, beside)
+        for each, scene, own, beside in zip(triangles, (old, new), textured, shaped, strict=True)
+    )
+    return first, second
+
+
+def _takes_tree(old: Scene, new: Scene, pairs: list[_Pair]) -> bool:
+    """Whether there are so many lights in both scenes together that they are chosen by a tree."""
+    weights = common_weights(old, new)
+    shining = {**_seen(old, weights), **_seen(new, weights)}
+    near = len(pairs) - _sun_count(pairs)
+    return takes_tree(near + len(shining), sum(len(obj.mesh.faces) for obj in shining.values()))
+
+
+def _paired_tree_tables(
+    device: Device,
+    scenes: tuple[Scene, Scene],
+    pairs: list[_Pair],
+    triangles: tuple[TriangleLights, TriangleLights],
+    has_image: bool,
+    textured: Sequence[bool],
+) -> tuple[LightTables, LightTables]:
+    """Those of both scenes with one light tree, over all that is a light in one of them."""
+    suns = _sun_count(pairs)
+    weights = [_common_weight(pair) for pair in pairs]
+    emitters = triangles[0].emitters
+    chosen = lights.tree_shares(has_image, emitters, weights[:suns], weights[suns:])
+    tree = TreeBuffers.of(device, paired_tree_lights(pairs[suns:], suns), emitters.tree_lights(len(pairs)))
+    changed = _changed(pairs)
+    first, second = (
+        LightTables.of(
+            device,
+            triangles[i].in_tree(),
+            has_image,
+            scenes[i].objects,
+            textured[i],
+            ShapedLights(
+                shaped_planes([pair[i] for pair in pairs], chosen.lights, changed, tree.shaped_trails),
+                suns,
+                float(chosen.lights.sum()),
+            ),
+            tree.tables(device, triangles[i].emitters, scenes[i].objects, chosen.triangles),
+        )
+        for i in range(2)
     )
     return first, second
 
@@ -102,11 +151,29 @@ def _light_pairs(old: Scene, new: Scene) -> list[_Pair]:
     same where they have the same name."""
     before, after = ({light.name: light for light in emissive_lights(scene)} for scene in (old, new))
     pairs = [(before.get(name), after.get(name)) for name in {**before, **after}]
-    return sorted(pairs, key=lambda pair: not any(light is not None and light.is_far for light in pair))
+    # Suns stand in front in each scene, and hardly ever among ten thousand others.
+    has_suns = any(next(iter(lights.values())).is_far for lights in (before, after) if lights)
+    return sorted(pairs, key=lambda pair: not _is_far(pair)) if has_suns else pairs
+
+
+def _is_far(pair: _Pair) -> bool:
+    return any(light is not None and light.is_far for light in pair)
+
+
+def _sun_count(pairs: list[_Pair]) -> int:
+    """How many suns stand in front of others."""
+    return next((i for i, pair in enumerate(pairs) if not _is_far(pair)), len(pairs))
+
+
+def _changed(pairs: list[_Pair]) -> npt.NDArray[np.bool_]:
+    return np.array([first is not second and first != second for first, second in pairs], np.bool_)
 
 
 def _common_weight(pair: _Pair) -> float:
-    return max(weight(light) for light in pair if light is not None)
+    first, second = pair
+    if first is None or second is None:
+        return weight(first or second)  # type: ignore[arg-type]
+    return weight(first) if first is second else max(weight(first), weight(second))
 
 
 def _triangle_power(old: Scene, new: Scene) -> float:
@@ -118,8 +185,7 @@ def _triangle_power(old: Scene, new: Scene) -> float:
 
 def paired_shaped_lights(pairs: list[_Pair], chosen: Shares) -> tuple[ShapedLights, ShapedLights]:
     """The lights of both scenes that are objects of their own. Those that differ have ShapedFlag.CHANGED."""
-    changed = np.array([first != second for first, second in pairs])
-    suns = sum(any(light is not None and light.is_far for light in pair) for pair in pairs)
+    changed, suns = _changed(pairs), _sun_count(pairs)
     first, second = (
         ShapedLights(
             shaped_planes([pair[i] for pair in pairs], chosen.lights, changed),
@@ -169,6 +235,7 @@ def paired_lights(
             ),
             densities,
             face_parts[i],
+            rows.emitters(i, power),
         )
         for i in range(2)
     )
@@ -207,13 +274,14 @@ def _shares(
 
 @dataclass(frozen=True, eq=False)
 class _Triangles:
-    """Those of an object: `corners` (F, 3, 3), `errors` (F, 3), `share` (F,) and `places` (F, 3, 2), see
-    `_Rows`."""
+    """Those of an object: `corners` (F, 3, 3), `errors` (F, 3), `share` (F,), `places` (F, 3, 2) and `face`
+    (F,), see `_Rows`."""
 
     corners: Array
     errors: Array
     share: Array
     places: Array
+    face: npt.NDArray[np.int64]
 
     @classmethod
     def of(cls, obj: Object, share: Array | None = None, material: Material = _PLAIN) -> _Triangles:
@@ -224,13 +292,16 @@ class _Triangles:
             lights.transform_errors(obj),
             np.ones(faces) if share is None else share,
             lights.texture_places(obj, material),
+            np.arange(faces),
         )
 
     def __getitem__(self, chosen: npt.NDArray[np.bool_]) -> _Triangles:
-        return _Triangles(self.corners[chosen], self.errors[chosen], self.share[chosen], self.places[chosen])
+        return _Triangles(*(getattr(self, name)[chosen] for name in _Triangles.__dataclass_fields__))
 
 
-_NO_TRIANGLES = _Triangles(np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3, 2)))
+_NO_TRIANGLES = _Triangles(
+    np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3, 2)), np.zeros(0, np.int64)
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,6 +318,9 @@ class _Rows:
     texture       (2, N) numbers of the textures of emission
     places        (2, N, 3, 2) texture coordinates at the corners
     has_other_texture  (N,) whether the textures of both scenes differ
+    name          (N,) of the object
+    face          (N,) its number in the mesh
+    present       (2, N) whether the scene has it
     """
 
     corners: Array
@@ -259,10 +333,13 @@ class _Rows:
     texture: npt.NDArray[np.uint32]
     places: Array
     has_other_texture: npt.NDArray[np.bool_]
+    name: npt.NDArray[np.object_]
+    face: npt.NDArray[np.int64]
+    present: npt.NDArray[np.bool_]
 
     @classmethod
     def joined(cls, parts: list[_Rows]) -> _Rows:
-        every = [_row(None, None, "", _NO_TRIANGLES, _NO_TRIANGLES, 0.0), *parts]
+        every = [_row(None, None, ("", ""), _NO_TRIANGLES, _NO_TRIANGLES, 0.0), *parts]
         return cls(
             np.concatenate([part.corners for part in every], axis=1),
             np.concatenate([part.errors for part in every], axis=1),
@@ -274,6 +351,9 @@ class _Rows:
             np.concatenate([part.texture for part in every], axis=1),
             np.concatenate([part.places for part in every], axis=1),
             np.concatenate([part.has_other_texture for part in every]),
+            np.concatenate([part.name for part in every]),
+            np.concatenate([part.face for part in every]),
+            np.concatenate([part.present for part in every], axis=1),
         )
 
     def chosen(self) -> _Rows:
@@ -290,11 +370,20 @@ class _Rows:
             self.texture[:, kept],
             self.places[:, kept],
             self.has_other_texture[kept],
+            self.name[kept],
+            self.face[kept],
+            self.present[:, kept],
         )
 
     @property
     def area(self) -> Array:
         return lights.areas(self.corners[0])
+
+    def emitters(self, scene: int, power: Array) -> Emitters:
+        """What a light tree needs of them, in one of the scenes."""
+        names, owner = np.unique(self.name.astype(str), return_inverse=True)
+        sides = self.double_sided[0] | self.double_sided[1]
+        return Emitters(self.corners, power, sides, names.tolist(), owner, self.face, self.present[scene])
 
     @property
     def shines(self) -> npt.NDArray[np.bool_]:
@@ -335,12 +424,12 @@ def _rows(
         if first is not None and second is not None:
             same = _same_faces(first, second)
             if same is not None:
-                found.append(_row(old, new, key[1], first[same], second[same], weight, texture_numbers))
+                found.append(_row(old, new, key, first[same], second[same], weight, texture_numbers))
                 first, second = first[~same], second[~same]
         if first is not None:
-            found.append(_row(old, None, key[1], first, first, weight, texture_numbers))
+            found.append(_row(old, None, key, first, first, weight, texture_numbers))
         if second is not None:
-            found.append(_row(None, new, key[1], second, second, weight, texture_numbers))
+            found.append(_row(None, new, key, second, second, weight, texture_numbers))
     return found
 
 
@@ -362,13 +451,14 @@ def _seen(scene: Scene, weights: Mapping[str, float]) -> dict[tuple[str, str], O
 def _row(
     old: Scene | None,
     new: Scene | None,
-    name: str,
+    key: tuple[str, str],
     first: _Triangles,
     second: _Triangles,
     weight: float,
     texture_numbers: tuple[Callable[[Material], int], Callable[[Material], int]] = (_untextured, _untextured),
 ) -> _Rows:
-    """Triangles with the material of that name in the scenes that are given."""
+    """Triangles of an object with a material, of these names, in the scenes that are given."""
+    obj, name = key
     count = len(first.corners)
     emission, double_sided = np.zeros((2, count, 3)), np.zeros((2, count), np.bool_)
     texture = np.zeros((2, count), np.uint32)
@@ -394,4 +484,7 @@ def _row(
         texture,
         np.stack([first.places, second.places]),
         np.full(count, has_other),
+        np.full(count, obj, np.object_),
+        first.face,
+        np.repeat([[old is not None], [new is not None]], count, axis=1),
     )

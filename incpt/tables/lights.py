@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,7 @@ import pyopencl as cl
 from incpt.core import affine, layout
 from incpt.core.layout import TextureSlot
 from incpt.device.device import Device
+from incpt.scene.light import Light
 from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
 from incpt.tables.alias import alias_table, luminance
@@ -19,12 +20,16 @@ from incpt.tables.emitter_shares import corner_places, face_shares
 from incpt.tables.shaped_lights import (
     NO_SHAPED_LIGHTS,
     ShapedLights,
+    Shares,
     emissive_lights,
     shaped_planes,
     shares,
+    sun_count,
+    tree_lights,
     weight,
 )
 from incpt.tables.textures import TextureTables
+from incpt.tables.tree_tables import NO_EMITTERS, Emitters, TreeBuffers, TreeTables, no_tree, takes_tree
 
 Array = npt.NDArray[np.float64]
 
@@ -50,15 +55,24 @@ def radiant_weight(material: Material) -> float:
 @dataclass(frozen=True, eq=False)
 class TriangleLights:
     """`planes` (len(LightPlane), N) float32, uints bit for bit; `densities` as in LightTables; `shares`: by
-    the name of an object whose emission has a texture, those of its faces in the density (F,)."""
+    the name of an object whose emission has a texture, those of its faces in the density (F,); `emitters`
+    is what a light tree needs of them."""
 
     planes: npt.NDArray[np.float32]
     densities: Mapping[str, float]
     shares: Mapping[str, Array] = field(default_factory=dict)
+    emitters: Emitters = NO_EMITTERS
 
     @property
     def count(self) -> int:
         return int(self.planes.shape[1])
+
+    def in_tree(self) -> TriangleLights:
+        """The same where a light tree chooses: the density of each is that of its points alone. Of those that
+        were chosen with a share of 1."""
+        planes, power = self.planes.copy(), self.emitters.power
+        planes[layout.LightPlane.PDF_AREA] *= power.sum() / power
+        return replace(self, planes=planes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,13 +85,15 @@ class LightTables:
                              the rays that meet them
     environment_probability  the chance that light sampling turns to the environment's image
     shaped                   the lights that are objects of their own
+    tree                     the light tree, or what stands for none
     """
 
     buffers: Mapping[str, cl.Buffer]
     count: int
     densities: Mapping[str, float]
     environment_probability: float
-    shaped: ShapedLights = NO_SHAPED_LIGHTS
+    shaped: ShapedLights
+    tree: TreeTables
 
     @classmethod
     def of(
@@ -88,21 +104,26 @@ class LightTables:
         objects: tuple[Object, ...],
         is_textured: bool,
         shaped: ShapedLights = NO_SHAPED_LIGHTS,
+        tree: TreeTables | None = None,
     ) -> LightTables:
         """Those of triangles that were chosen with `share_of_triangles`, or beside the lights `shaped` with
         the share that is left; `has_image` tells whether the environment has an image that shines. `objects`
-        are those of the scene; `is_textured` tells whether any material has a texture of emission."""
+        are those of the scene; `is_textured` tells whether any material has a texture of emission. With a
+        `tree` the triangles are those of `TriangleLights.in_tree`."""
         share = share_of_triangles(has_image) if triangles.count or shaped.count else 0.0
         probability = 1.0 - share if has_image else 0.0
         first, of_faces = _share_tables(triangles.shares, objects if is_textured else ())
         planes = triangles.planes if is_textured else triangles.planes[: layout.LightPlane.TEXTURE]
         buffers = {
             "lights": device.upload(planes),
-            "shaped_lights": device.upload(shaped.planes),
+            # Beside a tree, all of a light stands in a row: see shaped_light.cl.
+            "shaped_lights": device.upload(shaped.planes if tree is None else shaped.planes.T),
             "first_share": device.upload(first),
             "emitter_shares": device.upload(of_faces),
         }
-        return cls(buffers, triangles.count, triangles.densities, probability, shaped)
+        tree = no_tree(device) if tree is None else tree
+        buffers |= tree.buffers
+        return cls(buffers, triangles.count, triangles.densities, probability, shaped, tree)
 
 
 def _share_tables(
@@ -121,15 +142,56 @@ def light_tables(device: Device, scene: Scene, has_image: bool, textures: Textur
     """Those of a scene; `has_image` tells whether its environment has an image that shines."""
     objects, number = scene.objects, textures.emission_number
     is_textured = textures.has(TextureSlot.EMISSION)
-    lights = emissive_lights(scene)
+    lights, shining = emissive_lights(scene), emissive_objects(scene)
+    near = len(lights) - sun_count(lights)
+    if takes_tree(near + len(shining), sum(len(obj.mesh.faces) for obj in shining)):
+        triangles = triangle_lights(scene, 1.0, number)
+        if near or triangles.count:
+            return _tree_tables(device, scene, lights, triangles, has_image, is_textured)
     if not lights:
         triangles = triangle_lights(scene, share_of_triangles(has_image), number)
         return LightTables.of(device, triangles, has_image, objects, is_textured)
     chosen = shares(has_image, triangle_power(scene), [weight(light) for light in lights])
     planes = shaped_planes(lights, chosen.lights, np.zeros(len(lights), np.bool_))
-    shaped = ShapedLights(planes, sum(light.is_far for light in lights), float(chosen.lights.sum()))
+    shaped = ShapedLights(planes, sun_count(lights), float(chosen.lights.sum()))
     triangles = triangle_lights(scene, chosen.triangles, number)
     return LightTables.of(device, triangles, has_image, objects, is_textured, shaped)
+
+
+def _tree_tables(
+    device: Device,
+    scene: Scene,
+    lights: list[Light],
+    triangles: TriangleLights,
+    has_image: bool,
+    is_textured: bool,
+) -> LightTables:
+    """Those of a scene with a light tree over lights, suns first, and triangles that were chosen with a share
+    of 1."""
+    suns = sun_count(lights)
+    weights = [weight(light) for light in lights]
+    chosen = tree_shares(has_image, triangles.emitters, weights[:suns], weights[suns:])
+    tree = TreeBuffers.of(
+        device, tree_lights(lights[suns:], suns), triangles.emitters.tree_lights(len(lights))
+    )
+    unchanged = np.zeros(len(lights), np.bool_)
+    planes = shaped_planes(lights, chosen.lights, unchanged, tree.shaped_trails)
+    shaped = ShapedLights(planes, suns, float(chosen.lights.sum()))
+    return LightTables.of(
+        device,
+        triangles.in_tree(),
+        has_image,
+        scene.objects,
+        is_textured,
+        shaped,
+        tree.tables(device, triangles.emitters, scene.objects, chosen.triangles),
+    )
+
+
+def tree_shares(has_image: bool, emitters: Emitters, suns: Sequence[float], near: Sequence[float]) -> Shares:
+    """The chances of environment, light tree and suns, by the weights of suns and of lights that are near."""
+    power = np.pi * float(emitters.power.sum()) + float(np.sum(near))
+    return shares(has_image, power, suns)
 
 
 def triangle_power(scene: Scene) -> float:
@@ -166,6 +228,7 @@ def triangle_lights(
     of_faces = [face_shares(obj.mesh, material) for obj, material in zip(objects, materials, strict=True)]
     share_of_face = np.concatenate(of_faces)
     kept = (area >= SMALLEST_AREA) & (weights[owner] * share_of_face >= SMALLEST_WEIGHT)
+    face = np.concatenate([np.arange(len(obj.mesh.faces)) for obj in objects])[kept]
     owner, share_of_face = owner[kept], share_of_face[kept]
     power = weights[owner] * share_of_face * area[kept]
     if len(owner) == 0:
@@ -182,10 +245,13 @@ def triangle_lights(
         places = np.concatenate([texture_places(obj, materials[i]) for i, obj in enumerate(objects)])
         set_textures(planes, numbers[owner], places[kept])
     lit = np.flatnonzero(np.bincount(owner)).tolist()
+    sides = np.array([material.double_sided for material in materials], np.bool_)[owner]
+    names, all_here = [obj.name for obj in objects], np.ones(len(owner), np.bool_)
     return TriangleLights(
         planes,
         {objects[i].material: float(density[i]) for i in lit},
         {obj.name: own for obj, own, number in zip(objects, of_faces, numbers, strict=True) if number},
+        Emitters(corners[kept][None], power, sides, names, owner, face, all_here),
     )
 
 

@@ -82,6 +82,7 @@ class SceneTables:
             "SUN": self._has_image_light and self.scene.environment.has_sun,
             "TRIANGLE_LIGHTS": self.light_count > 0,
             "SHAPED_LIGHTS": self.lights.shaped.count > 0,
+            "LIGHT_TREE": self.lights.tree.levels > 0,
         }
         return tuple(name for name, holds in names.items() if holds)
 

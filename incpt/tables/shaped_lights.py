@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from incpt.core.layout import ShapedFlag, ShapedPlane
 from incpt.scene.light import Light
 from incpt.scene.model import Scene
 from incpt.tables.alias import alias_table, luminance
+from incpt.tables.light_tree import TreeLights, merged_cones
 
 Array = npt.NDArray[np.float64]
 
@@ -32,7 +33,7 @@ _SHARPEST = 1e-6
 @dataclass(frozen=True, eq=False)
 class ShapedLights:
     """`planes` (len(ShapedPlane), N) float32, uints bit for bit; how many of them are suns; the chance that
-    light sampling chooses one of them."""
+    light sampling chooses one of them, or beside a light tree one of the suns."""
 
     planes: npt.NDArray[np.float32]
     sun_count: int = 0
@@ -48,19 +49,45 @@ NO_SHAPED_LIGHTS = ShapedLights(np.zeros((len(ShapedPlane), 0), np.float32))
 
 def emissive_lights(scene: Scene) -> list[Light]:
     """Those that are there, suns first."""
-    return sorted((light for light in scene.lights if light.is_emissive), key=lambda light: not light.is_far)
+    lights = [light for light in scene.lights if light.is_emissive]
+    suns = [light for light in lights if light.kind == "sun"]
+    return suns + [light for light in lights if light.kind != "sun"] if suns else lights
+
+
+def sun_count(lights: Sequence[Light]) -> int:
+    """How many suns stand in front of others."""
+    return next((i for i, light in enumerate(lights) if not light.is_far), len(lights))
 
 
 def weight(light: Light) -> float:
     """The power that counts in choosing lights, W: the luminance of `Light.watts`."""
+    known = light.__dict__
+    if "_weight" not in known:
+        known["_weight"] = _weight(light)
+    return float(known["_weight"])
+
+
+def _weight(light: Light) -> float:
     factor = np.pi * SUN_RADIUS**2 if light.is_far else 1.0
     return factor * float(luminance(light.watts))
+
+
+def _rows(lights: Sequence[Light | None], name: str, make: Callable[[Light], bytes]) -> bytes:
+    """What `make` makes of each light, one after the other; of None it is `_NOTHING`. It is kept with the
+    light, which never changes: an edit changes one of ten thousand lights, and all stand in the new table."""
+    try:
+        return b"".join([_NOTHING if light is None else light.__dict__[name] for light in lights])
+    except KeyError:
+        for light in lights:
+            if light is not None and name not in light.__dict__:
+                light.__dict__[name] = make(light)
+        return _rows(lights, name, make)
 
 
 @dataclass(frozen=True, eq=False)
 class Shares:
     """How light sampling chooses: the chances of the environment, of all triangles together, and of each
-    light (N,)."""
+    light (N,). With a light tree all that is in it takes the place of triangles, and suns that of lights."""
 
     environment: float
     triangles: float
@@ -78,26 +105,31 @@ def shares(has_image: bool, triangle_power: float, weights: Sequence[float]) -> 
 
 
 def shaped_planes(
-    lights: Sequence[Light | None], chances: Array, changed: npt.NDArray[np.bool_]
+    lights: Sequence[Light | None],
+    chances: Array,
+    changed: npt.NDArray[np.bool_],
+    trails: npt.NDArray[np.uint32] | None = None,
 ) -> npt.NDArray[np.float32]:
     """(len(ShapedPlane), N): None is a light that another scene has in its place, which emits nothing
-    here. `chances` (N,) of choosing each among all lights; `changed` (N,) see LightFlag.CHANGED."""
-    planes = np.zeros((len(ShapedPlane), len(lights)), np.float32)
-    flags = np.array([_flags(light) for light in lights], np.uint32)
+    here. `chances` (N,) of choosing each among all lights; `changed` (N,) see LightFlag.CHANGED. With
+    `trails` the lights have them in a light tree, but for the suns in front: as many as are given less."""
+    columns = _rows(lights, "_column", _column)
+    planes = np.frombuffer(columns, np.float32).reshape(-1, len(ShapedPlane)).T.copy()
+    flags = planes[ShapedPlane.FLAGS].view(np.uint32)
     flags |= changed.astype(np.uint32) * np.uint32(ShapedFlag.CHANGED)
-    for i, light in enumerate(lights):
-        if light is not None:
-            planes[:, i] = _column(light)
-    planes[ShapedPlane.PROBABILITY] = chances
-    planes[ShapedPlane.ALIAS_PROBABILITY], alias = alias_table(chances)
-    planes[ShapedPlane.ALIAS] = alias.view(np.float32)
-    planes[ShapedPlane.FLAGS] = flags.view(np.float32)
+    suns = 0 if trails is None else len(lights) - len(trails)
+    table = slice(None) if trails is None else slice(suns)
+    planes[ShapedPlane.PROBABILITY] = 1
+    planes[ShapedPlane.PROBABILITY, table] = chances[table]
+    if len(chances[table]):
+        planes[ShapedPlane.ALIAS_PROBABILITY, table], alias = alias_table(chances[table])
+        planes[ShapedPlane.ALIAS, table] = alias.view(np.float32)
+    if trails is not None:
+        planes[ShapedPlane.TRAIL, suns:] = trails.view(np.float32)
     return planes
 
 
-def _flags(light: Light | None) -> int:
-    if light is None:
-        return ShapedFlag.BALL | ShapedFlag.POINT
+def _flags(light: Light) -> int:
     return (
         _SHAPES[light.kind]
         | (ShapedFlag.DOUBLE_SIDED if light.double_sided and light.kind in ("rectangle", "disk") else 0)
@@ -107,7 +139,8 @@ def _flags(light: Light | None) -> int:
     )
 
 
-def _column(light: Light) -> npt.NDArray[np.float32]:
+def _column(light: Light) -> bytes:
+    """What planes have of a light, but for chances and places."""
     plane, column = layout.ShapedPlane, np.zeros(len(ShapedPlane), np.float32)
     column[plane.CENTER_X : plane.CENTER_Z + 1] = light.position
     column[plane.X_X : plane.X_Z + 1], column[plane.Y_X : plane.Y_Z + 1] = light.axes[:2]
@@ -119,4 +152,71 @@ def _column(light: Light) -> npt.NDArray[np.float32]:
         inner, outer = light.cone
         scale = 1 / max(inner - outer, _SHARPEST)
     column[plane.CONE_OUTER], column[plane.CONE_SCALE] = outer, scale
-    return column
+    column[plane.FLAGS : plane.FLAGS + 1].view(np.uint32)[0] = _flags(light)
+    return column.tobytes()
+
+
+def _nothing() -> bytes:
+    column = np.zeros(len(ShapedPlane), np.float32)
+    column[ShapedPlane.FLAGS : ShapedPlane.FLAGS + 1].view(np.uint32)[0] = ShapedFlag.BALL | ShapedFlag.POINT
+    return column.tobytes()
+
+
+_NOTHING = _nothing()
+
+
+def tree_lights(lights: Sequence[Light], first: int) -> TreeLights:
+    """What the light tree needs to know of lights that are no suns; the first has the number `first`."""
+    rows = np.frombuffer(_rows(lights, "_tree_row", _tree_row), np.float64).reshape(-1, _TREE_ROW_SIZE)
+    return TreeLights(
+        rows[:, :6].reshape(-1, 2, 3),
+        rows[:, 6:9],
+        rows[:, 9],
+        rows[:, 10],
+        rows[:, 11],
+        rows[:, 12] > 0,
+        np.arange(first, first + len(lights), dtype=np.uint32),
+    )
+
+
+_TREE_ROW_SIZE = 13
+
+
+def _tree_row(light: Light) -> bytes:
+    spread, falloff = np.pi, np.pi / 2
+    if light.kind in ("rectangle", "disk") and not light.double_sided:
+        spread = 0.0
+    elif light.kind == "spot":
+        inner, outer = np.arccos(light.cone)
+        spread, falloff = inner, outer - inner
+    intensity = float(luminance(light.emitted)) * (light.face if light.has_size else 1.0)
+    row = [*light.world_bounds.ravel(), *-light.axes[2], spread, falloff, intensity, light.has_size]
+    return np.array(row, np.float64).tobytes()
+
+
+def paired_tree_lights(pairs: Sequence[tuple[Light | None, Light | None]], first: int) -> TreeLights:
+    """The same of lights in two scenes, None where one is not there: bounds of both, and the larger power."""
+    before, after = (
+        tree_lights([pair[i] or pair[1 - i] for pair in pairs], first)  # type: ignore[misc]
+        for i in range(2)
+    )
+    differs = np.array([None not in pair and pair[0] is not pair[1] for pair in pairs], np.bool_)
+    axis, spread = before.axis.copy(), before.spread.copy()
+    axis[differs], spread[differs] = merged_cones(
+        (before.axis[differs], before.spread[differs]), (after.axis[differs], after.spread[differs])
+    )
+    return TreeLights(
+        np.stack(
+            [
+                np.minimum(before.bounds[:, 0], after.bounds[:, 0]),
+                np.maximum(before.bounds[:, 1], after.bounds[:, 1]),
+            ],
+            axis=1,
+        ),
+        axis,
+        spread,
+        np.maximum(before.falloff, after.falloff),
+        np.maximum(before.power, after.power),
+        before.met | after.met,
+        before.numbers,
+    )

@@ -35,6 +35,7 @@ def files_of_kernels() -> dict[str, str]:
 FILES = files_of_kernels()
 FEATURES = dict.fromkeys(("sample_lights", "touch_lights"), ("TRIANGLE_LIGHTS",))
 FEATURES["trace_blocks"] = ("TRIANGLE_LIGHTS", "MEDIA", "AOVS")
+FEATURES["choose_lights"] = ("TRIANGLE_LIGHTS", "LIGHT_TREE")
 
 
 def declared(device: Device, name: str) -> list[tuple[str, str]]:

@@ -47,7 +47,7 @@ def test_only_scalars_of_four_bytes() -> None:
 def test_constants_and_planes_are_in_the_header() -> None:
     header = layout.c_header()
     assert "#define NODE_LEAF 2147483648u" in header
-    assert "#define SURFACE_MATERIAL 12u" in header and "#define PATH_PLANES 11u" in header
+    assert "#define SURFACE_MATERIAL 12u" in header and "#define PATH_PLANES 12u" in header
     assert "#define COUNTS_RAY_SHIFT 16u" in header and "#define COUNTS_RAY_MASK 255u" in header
     assert "#define CLASS_MEDIUM 8u" in header and "#define MIN_ALPHA 0.001f" in header
 

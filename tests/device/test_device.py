@@ -295,6 +295,11 @@ VARIANTS = [
     (*LIGHTS, "SHAPED_LIGHTS", "MEDIA", "CHANGES"),
     (*LIGHTS[:1], "SHAPED_LIGHTS", *RESTRICTIONS[:3], "MATTE", "CHANGES"),
     ("SHAPED_LIGHTS", "MEDIA", *RESTRICTIONS, "PORTABLE_LANES"),
+    ("SHAPED_LIGHTS", "LIGHT_TREE"),
+    ("TRIANGLE_LIGHTS", "LIGHT_TREE", *RESTRICTIONS[:3], "CHANGES"),
+    (*LIGHTS, "SHAPED_LIGHTS", "LIGHT_TREE", "MEDIA", "CHANGES"),
+    (*LIGHTS, "SHAPED_LIGHTS", "LIGHT_TREE", *RESTRICTIONS[:3], "MATTE"),
+    ("TRIANGLE_LIGHTS", "SHAPED_LIGHTS", "LIGHT_TREE", "MEDIA", "PORTABLE_LANES"),
     ("CHANGES",),
     (*LIGHTS, "MEDIA", "CHANGES"),
     (*LIGHTS, "MEDIA", *RESTRICTIONS, "CHANGES"),
@@ -345,7 +350,7 @@ def test_kernels_build_without_warnings(device: Device) -> None:
         pytest.skip("other compilers warn of code that is made for clang on a CPU")
     files = {file for file, path in program.files().items() if "__kernel" in program.source(path)}
     # Blocks have a test of their own, and without lights there is nothing to sample.
-    plain = {(file, ()) for file in files - {"trace_blocks", "sample_lights"}}
+    plain = {(file, ()) for file in files - {"trace_blocks", "sample_lights", "choose_lights"}}
     variants = [*VARIANTS, *((*features, "CLAMP_INDIRECT") for features in VARIANTS[:2])]
     for file, features in sorted({*plain, ("generate", ("LENS",)), *of_wavefront(variants)}):
         built = cl.Program(device.context, device.program_text(file, features))

@@ -19,13 +19,13 @@ from incpt.render.session import Session
 from incpt.scene.change import diff
 from incpt.scene.light import KINDS
 from incpt.scene.model import Scene
-from incpt.scenes import make_city
+from incpt.scenes import make_city, make_many_lamps
 from incpt.tables.materials import traits_of
 
 FOLDER = Path(str(resources.files("incpt.scenes")))
 NAMES = (
-    "editing", "nested_dielectrics", "cornell", "mis", "bunny", "city", "textured", "lamps", "cameras",
-    "materials",
+    "editing", "nested_dielectrics", "cornell", "mis", "bunny", "city", "textured", "lamps", "many_lamps",
+    "cameras", "materials",
 )  # fmt: skip
 FLOOR_TOLERANCE = 0.01
 """Metres that an object may stand above or in its floor."""
@@ -171,6 +171,18 @@ def test_lights_of_mis_have_equal_power(scenes: dict[str, Scene]) -> None:
 
 def test_lamps_has_every_kind(scenes: dict[str, Scene]) -> None:
     assert {light.kind for light in scenes["lamps"].lights} == set(KINDS)
+
+
+def test_many_lamps_are_what_their_script_makes(tmp_path: Path, scenes: dict[str, Scene]) -> None:
+    assert len(scenes["many_lamps"].lights) > 3000
+    make_many_lamps.main(tmp_path)
+    made, shipped = ((folder / "many_lamps.toml").read_text("utf-8") for folder in (tmp_path, FOLDER))
+    assert made.splitlines()[:9] == shipped.splitlines()[:9]
+    # Sine and cosine may differ in the last bit, and with it the last digit.
+    new, old = load(tmp_path / "many_lamps.toml"), scenes["many_lamps"]
+    assert [light.name for light in new.lights] == [light.name for light in old.lights]
+    places = [[light.position for light in scene.lights] for scene in (new, old)]
+    np.testing.assert_allclose(*places, rtol=2e-3, atol=1e-6)
 
 
 def test_materials_has_every_trait(scenes: dict[str, Scene]) -> None:
