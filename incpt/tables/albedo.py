@@ -169,8 +169,8 @@ def rows() -> npt.NDArray[np.float32]:
 @lru_cache(maxsize=1)
 def sheen_table() -> Array:
     """(roughness, cosine) what a white sheen reflects, at ALBEDO_TABLE_SIZE roughnesses and roots of cosines
-    from 0 to 1: the distribution and masking of A. Conty Estevez and C. Kulla, Production Friendly Microfacet Sheen
-    BRDF, SIGGRAPH Courses 2017. It is above 1 at grazing angles where the roughness is low."""
+    from 0 to 1: the distribution and masking of A. Conty Estevez and C. Kulla, Production Friendly Microfacet
+    Sheen BRDF, SIGGRAPH Courses 2017. It is above 1 at grazing angles where the roughness is low."""
     grid = np.linspace(0.0, 1.0, ALBEDO_TABLE_SIZE)
     mu_o = np.maximum(grid**2, 1e-4)[:, None, None]
     t = (np.arange(_SHEEN_COSINES) + 0.5) / _SHEEN_COSINES

@@ -104,7 +104,7 @@ def flat_box() -> Scene:
 
 def everything() -> Scene:
     """What kernels can be asked for, at once: walls and rough glass that absorbs, every layer, textures,
-    holes, colours of vertices, lights of every kind beside those of triangles, a sky with its sun, and a lens.
+    holes, colours of vertices, lights of every kind beside those of triangles, a sky and its sun, and a lens.
 
     Each scene has kernels of its own to be built and simulated, so that one for each of these would take long
     and run through no more code. Its ball has not the twenty thousand triangles of the built-in sphere, from
