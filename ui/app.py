@@ -16,6 +16,7 @@ from incpt.ui.editor import recovery
 from incpt.ui.editor.document import Document
 from incpt.ui.editor.editor import Editor
 from incpt.ui.frame import draw_picture, take_frame
+from incpt.ui.panels import textures
 from incpt.ui.rect import Rect
 from incpt.ui.viewport.viewport import Viewport
 from incpt.ui.window import Window
@@ -86,8 +87,9 @@ class App:
         if window.wants_to_close:
             window.wants_to_close = False
             files.quit_(editor)
-        for path in window.take_dropped():
-            editor.attempt(lambda path=path: files.drop(editor, path))  # type: ignore[misc]
+        for dropped in window.take_dropped():
+            slot = textures.slot_at(dropped.x, dropped.y)
+            editor.attempt(lambda path=dropped.path, slot=slot: files.drop(editor, path, slot))  # type: ignore[misc]
         if editor.frame is not None and editor.frame is not self.shown_frame:
             self.display.upload(editor.frame.pictures, editor.frame.first_hits)
             self.shown_frame = editor.frame

@@ -7,7 +7,7 @@ import math
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from imgui_bundle import imgui  # It comes before glfw, because it brings the library that glfw loads.
 
@@ -23,6 +23,14 @@ _SETTLING_FRAMES = 3
 """Frames that imgui needs after an event until hover and layout are at rest."""
 _TOOLTIP_SECONDS = 0.5
 """After the last event comes a frame for tooltips, which wait until the mouse rests."""
+
+
+class Dropped(NamedTuple):
+    """A file that was dropped on the window, and where: points from its top left."""
+
+    path: Path
+    x: float
+    y: float
 
 
 class Window:
@@ -45,7 +53,7 @@ class Window:
         glfw.make_context_current(self.handle)
         glfw.swap_interval(1)
         self.context = moderngl.create_context(require=330)
-        self.dropped: list[Path] = []
+        self.dropped: list[Dropped] = []
         self.wants_to_close = False
         self._title = title
         self._frames_due = _SETTLING_FRAMES
@@ -152,7 +160,7 @@ class Window:
             self._title = title
             glfw.set_window_title(self.handle, title)
 
-    def take_dropped(self) -> list[Path]:
+    def take_dropped(self) -> list[Dropped]:
         """Files dropped on the window since the last call."""
         dropped, self.dropped = self.dropped, []
         return dropped
@@ -178,7 +186,8 @@ class Window:
 
     def _drop(self, _window: Any, paths: Any, *_: Any) -> None:
         # The stubs of glfw have the C signature; the wrapper passes a list of paths.
-        self.dropped += map(Path, paths)
+        x, y = glfw.get_cursor_pos(self.handle)
+        self.dropped += (Dropped(Path(path), x, y) for path in paths)
         self.redraw()
 
     def _close_asked(self, window: Any) -> None:

@@ -92,20 +92,26 @@ def choose_environment(editor: Editor) -> None:
 
 
 def choose_texture(editor: Editor, material: str, slot: TextureSlot) -> None:
-    """Ask for an image and put it into a slot of a material. An emission that is black becomes white, else
-    the image would not be seen."""
-
-    def use(path: Path) -> None:
-        values: dict[str, Any] = {texture_name(slot): Texture(load_bitmap(path))}
-        if slot is TextureSlot.EMISSION and not editor.scene.materials[material].is_emissive:
-            values["emission"] = (1.0, 1.0, 1.0)
-        editor.propose(editor.scene.with_material(material, **values), "Texture")
-
-    ask_path(editor, "Texture", TEXTURES, False, use)
+    """Ask for an image and put it into a slot of a material."""
+    ask_path(editor, "Texture", TEXTURES, False, lambda path: use_texture(editor, material, slot, path))
 
 
-def drop(editor: Editor, path: Path) -> None:
-    """Take a file that was dropped on the window: open a scene, add a mesh, use an environment image."""
+def use_texture(editor: Editor, material: str, slot: TextureSlot, path: Path) -> None:
+    """Put an image into a slot of a material. An emission that is black becomes white, else the image would
+    not be seen."""
+    values: dict[str, Any] = {texture_name(slot): Texture(load_bitmap(path))}
+    if slot is TextureSlot.EMISSION and not editor.scene.materials[material].is_emissive:
+        values["emission"] = (1.0, 1.0, 1.0)
+    editor.propose(editor.scene.with_material(material, **values), "Texture")
+
+
+def drop(editor: Editor, path: Path, slot: TextureSlot | None = None) -> None:
+    """Take a file that was dropped on the window: open a scene, add a mesh, use an environment image; or, on
+    the row of a texture's slot, put it there into the material of the active object."""
+    active = editor.selection.active
+    if slot is not None and active is not None and active in editor.scene.object_index:
+        use_texture(editor, editor.scene.object(active).material, slot, path)
+        return
     if insert.file_kind(path) is FileKind.SCENE:
         open_file(editor, path)
         return

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from imgui_bundle import imgui
+
 from incpt.core.layout import TextureSlot
 from incpt.scene.material import Material, texture_name, texture_of
 from incpt.scene.texture import Texture
-from incpt.ui.widgets import widgets
+from incpt.ui.rect import Rect
+from incpt.ui.widgets import places, widgets
 from incpt.ui.widgets.refusals import Refusals
 
 _LABELS = {
@@ -64,8 +67,9 @@ def draw(material: Material, refusals: Refusals) -> tuple[Material, TextureReque
             if texture is None and not _is_shown(material, slot):
                 continue
             with widgets.row(label, tip):
-                if widgets.button(f"Choose…##{name}", "An image file"):
+                if widgets.button(f"Choose…##{name}", "An image file; or drop one here"):
                     request = TextureRequest(slot)
+                places.note_rect(f"slot {name}", _row_rect())
                 widgets.same_line()
                 if widgets.button(f"Remove##{name}", enabled=texture is not None):
                     material = refusals.changed(material, **{name: None})
@@ -76,6 +80,24 @@ def draw(material: Material, refusals: Refusals) -> tuple[Material, TextureReque
             if slot is TextureSlot.CLEARCOAT_NORMAL and texture is not None:
                 material = _draw_strength(material, refusals, "clearcoat_normal_scale", "Coat strength")
         return material, request
+
+
+def slot_at(x: float, y: float) -> TextureSlot | None:
+    """The slot whose row was drawn at this place of the window, in points; None: there is none."""
+    for slot in TextureSlot:
+        name = texture_name(slot)
+        row, button = places.find(f"slot {name}"), places.find(f"Choose…##{name}")
+        # A row that its panel has scrolled out of sight has no button.
+        if row is not None and button is not None and row.contains((x, y)):
+            return slot
+    return None
+
+
+def _row_rect() -> Rect[float]:
+    """The whole row of the widget drawn last, across the panel."""
+    left, width = imgui.get_window_pos().x, imgui.get_window_width()
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    return Rect(left, low.y, width, high.y - low.y)
 
 
 def _is_shown(material: Material, slot: TextureSlot) -> bool:

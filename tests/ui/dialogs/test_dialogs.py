@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
+from support.parameters import A_TEXTURE
 from support.small_scenes import mixed_scene
 from support.ui_harness import Desk, changes, desk, flat, state
 
 from incpt.core.errors import OutputError
-from incpt.formats import registry, scene_save
+from incpt.core.layout import TextureSlot
+from incpt.formats import bitmaps, registry, scene_save
 from incpt.scene.selection import Selection
 from incpt.ui.commands import files, pictures
 from incpt.ui.dialogs import native
@@ -23,6 +25,7 @@ from incpt.ui.dialogs.question import Question
 from incpt.ui.editor import clipboard
 from incpt.ui.editor.document import new_scene
 from incpt.ui.editor.recovery import Recovery
+from incpt.ui.panels import textures
 from incpt.viewer.renderer import Export
 
 SCENE = mixed_scene(size=(48, 32)).with_environment(image=None)
@@ -391,6 +394,28 @@ def test_a_dropped_image_lights_the_scene(user: Desk, tmp_path: Path) -> None:
     user.click("Choose…##image")
     answer(user, "sky.exr")
     assert user.scene.environment.image is not None and user.undo_count == 1
+
+
+def test_an_image_dropped_on_a_slot_is_its_texture(user: Desk, tmp_path: Path) -> None:
+    """Also one that would be an environment elsewhere; what is no image is told, and nothing is lost."""
+    bitmaps.write_bitmap(tmp_path / "wood.png", A_TEXTURE.bitmap)
+    user.editor.select(Selection(("red cube",)))
+    user.panel("Object")
+    user.frames(2)
+    user.click("Textures")
+    user.frames(2)
+    x, y = user.place("Choose…##normal_texture")
+    assert textures.slot_at(x, y) is TextureSlot.NORMAL and textures.slot_at(x - 80, y) is TextureSlot.NORMAL
+    assert textures.slot_at(*user.place("picture")) is None
+    slot = textures.slot_at(*user.place("Choose…##base_color_texture"))
+    assert user.editor.attempt(lambda: files.drop(user.editor, tmp_path / "wood.png", slot))
+    texture = user.scene.materials["red"].base_color_texture
+    assert texture is not None and texture.bitmap.source.file == str(tmp_path / "wood.png")
+    assert user.undo_count == 1
+    (tmp_path / "a.txt").write_text("no image")
+    before = user.scene
+    assert not user.editor.attempt(lambda: files.drop(user.editor, tmp_path / "a.txt", slot))
+    assert user.scene == before and "a.txt" in user.texts()[0]
 
 
 @pytest.mark.parametrize("name", ["a.docx", "a", "broken.obj", "broken.exr", "broken.toml", "gone.obj"])
