@@ -6,15 +6,16 @@
 
 #ifdef CUTOUTS
 // Keys of the first `count` paths: 1 where a ray goes on behind its hit, of those that have the key 1.
-INLINE void keep_passing(const Block *block, const State *state, __local const float *hits, uint count,
-                         uint layer, int is_shadow) {
+INLINE void keep_passing(const Block *block, const State *state, __local const float *hits,
+                         __local const float *rays, uint count, uint layer, int is_shadow) {
     __local uint *keys = UINT_PLANES(block->memory, KEYS);
     LANES
     for (int i = 0; i < (int)count; i++) {
         const Path path = load_path(state, i);
         const RawHit hit = load_hit(hits, i);
-        int passes =
-            passes_hit(block->params, &block->geometry, &block->shading, &path, &hit, layer, is_shadow);
+        const Vec3 direction = load_ray(rays, BLOCK_STRIDE, i).direction;
+        int passes = passes_hit(block->params, &block->geometry, &block->shading, &path, &hit, direction,
+                                layer, is_shadow);
         keys[i] = keys[i] & (uint)passes;
     }
 }
@@ -39,7 +40,7 @@ STAGE void pass_cutouts(const Block *block, uint count) {
         keys[i] = 1u;
         travelled[i] = 0.0f;
     }
-    keep_passing(block, traced, hits, count, 0u, 0);
+    keep_passing(block, traced, hits, traced->rays, count, 0u, 0);
     uint passing = list_passing(block, count);
     if (passing == 0)
         return;
@@ -56,7 +57,7 @@ STAGE void pass_cutouts(const Block *block, uint count) {
         interleaved_nearest(block, count, passing);
         if (layer == MOST_LAYERS)
             break;
-        keep_passing(block, traced, hits, count, layer, 0);
+        keep_passing(block, traced, hits, traced->rays, count, layer, 0);
         passing = list_passing(block, count);
     }
     LANES
@@ -91,7 +92,7 @@ STAGE void trace_shadows_through_cutouts(const Block *block, uint count) {
         }
         if (layer == MOST_LAYERS)
             break;
-        keep_passing(block, state, hits, count, layer, 1);
+        keep_passing(block, state, hits, state->shadows, count, layer, 1);
         left = list_passing(block, count);
         LANES
         for (int k = 0; k < (int)left; k++) {

@@ -27,7 +27,7 @@ __kernel __attribute__((vec_type_hint(float8))) void intersect(LAUNCH_PARAMETERS
     float travelled = 0.0f;
     bool met = bvh_nearest(&geometry, ray, INFINITY, &hit);
     for (uint layer = 0u; met && layer < MOST_LAYERS; layer++) {
-        if (!passes_hit(&params, &geometry, &shading, &p, &hit, layer, 0))
+        if (!passes_hit(&params, &geometry, &shading, &p, &hit, ray.direction, layer, 0))
             break;
         travelled += hit.distance;
         ray.origin = behind_hit(&geometry, &hit, ray.direction);

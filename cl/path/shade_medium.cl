@@ -1,5 +1,6 @@
 #include "path/surface_emission.cl"
 #include "path/clamp.cl"
+#include "shading/clear_wall.cl"
 #include "shading/dielectric.cl"
 
 // What happens where a ray ends on a transparent body, or inside one: absorption on the way, then the
@@ -47,6 +48,14 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
 
     // A material that is partly transmissive is taken for opaque by chance.
     Uniform2 luck = uniform_2d(seed, p.sample, PAIR_LUCK(p.ray));
+#if HAS_TRAIT(CLEAR_WALL)
+    // Rays that a clear wall lets through have not ended on it.
+    __global const Material *own = &shading->materials[surface.material];
+    int clear = is_clear_wall(shading, own, surface.object);
+    float mirrored = wall_share(own, FABS(dot(surface.geometric, direction)));
+    float ended = 1.0f - own->transmission + mirrored;
+    material.transmission = clear ? mirrored / MAX(ended, 1e-12f) : material.transmission;
+#endif
     int opaque = luck.v >= material.transmission;
     float facing = orient_surface(&surface, direction, 1);
     Vec3 emitted = surface_emission(shading, &surface, &material, facing, p.bsdf_pdf);
@@ -87,6 +96,9 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
     boundary.eta = far_ior / near_ior;
 #if HAS_TRAIT(THIN_WALLED)
     boundary.thin = thin;
+#if HAS_TRAIT(CLEAR_WALL)
+    boundary.clear = clear;
+#endif
     boundary.eta = thin ? material.ior / near_ior : boundary.eta;
 #endif
 #if HAS_TRAIT(SPECULAR_COLOR)

@@ -17,7 +17,7 @@ INLINE uint asks_for_changed_light(const Params *params, const Shading *shading,
 #endif
     // As in shade_medium: only smooth boundaries need no light.
     int opaque = uniform_2d(seed, p.sample, PAIR_LUCK(p.ray)).v >= material->transmission;
-#if TEXTURED(TRANSMISSION)
+#if TEXTURED(TRANSMISSION) || HAS_TRAIT(CLEAR_WALL)
     opaque = 1; // or may be
 #endif
     int rough = material->roughness * material->roughness > MIN_ALPHA;

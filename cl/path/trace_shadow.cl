@@ -34,7 +34,7 @@ __kernel __attribute__((vec_type_hint(float8))) void trace_shadow(LAUNCH_PARAMET
     RawHit hit;
     bool occluded = bvh_nearest(&geometry, ray, left, &hit);
     for (uint layer = 0u; occluded && layer < MOST_LAYERS; layer++) {
-        if (!passes_hit(&params, &geometry, &shading, &p, &hit, layer, 1))
+        if (!passes_hit(&params, &geometry, &shading, &p, &hit, ray.direction, layer, 1))
             break;
         left -= hit.distance;
         ray.origin = behind_hit(&geometry, &hit, ray.direction);

@@ -18,6 +18,9 @@ typedef struct {
 #if HAS_TRAIT(THIN_WALLED)
     int thin;
 #endif
+#if HAS_TRAIT(CLEAR_WALL)
+    int clear;
+#endif
 #if HAS_TRAIT(SPECULAR_COLOR)
     Vec3 tint; // of what is reflected
 #endif
@@ -45,11 +48,14 @@ INLINE Parting boundary_parting(const Boundary *b, float cosine) {
     float f = fresnel_dielectric(cosine, b->eta);
     int total = !(f < 1.0f);
 #if HAS_TRAIT(THIN_WALLED)
-    // The sum of all that leaves in front, after any number of ways to and fro: f + (1 - f)^2 f / (1 - f^2).
-    f = is_thin(b) ? 2.0f * f / (1.0f + f) : f;
+    f = is_thin(b) ? wall_reflectance(cosine, b->eta) : f;
 #endif
     Parting parting;
     parting.reflects = total ? 1.0f : f * b->specular;
+#if HAS_TRAIT(CLEAR_WALL)
+    // What goes through has not ended here.
+    parting.reflects = b->clear ? 1.0f : parting.reflects;
+#endif
     parting.reflected = vec3(1.0f, 1.0f, 1.0f);
     parting.passed = b->transmitted;
 #if HAS_TRAIT(SPECULAR_COLOR) || HAS_TRAIT(IRIDESCENCE)

@@ -12,6 +12,13 @@ INLINE float fresnel_dielectric(float cosine, float eta) {
     return sin2_t >= 1.0f ? 1.0f : reflected;
 }
 
+// Of a wall without a thickness: the sum of all that leaves in front, after any number of ways to and fro,
+// f + (1 - f)^2 f / (1 - f^2).
+INLINE float wall_reflectance(float cosine, float eta) {
+    float f = fresnel_dielectric(cosine, eta);
+    return 2.0f * f / (1.0f + f);
+}
+
 // Schlick's approximation, from the reflectance at normal incidence.
 INLINE float schlick(float f0, float cosine) {
     float c = 1.0f - CLAMP(cosine, 0.0f, 1.0f);

@@ -562,6 +562,7 @@ class MaterialFlag(IntFlag):
     MASKED = 8
     THIN_WALLED = 16
     UNLIT = 32
+    CLEAR_WALL = 64
 
 
 class MaterialTrait(IntEnum):
@@ -577,6 +578,7 @@ class MaterialTrait(IntEnum):
     THIN_WALLED = 6
     DISPERSION = 7
     UNLIT = 8
+    CLEAR_WALL = 9
 
 
 class TextureSlot(IntEnum):

@@ -57,7 +57,7 @@ _FEATURES: Mapping[str | None, tuple[str, ...]] = {
     "shade": (*_LIGHTS, *_MATERIALS, _CLAMP),
     "write_aovs": _MATERIALS,
     "first_hits": _MATERIALS,
-    "trace_shadow": (*_TEXTURES, "CUTOUTS", _SHAPED, _TREE),
+    "trace_shadow": (*_TRACED, _SHAPED, _TREE),
 }
 """The features of a scene without which a kernel would leave something out. Those that would only make it
 quicker, as they do blocks, would be more variants to build."""

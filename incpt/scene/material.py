@@ -7,7 +7,7 @@ from types import NoneType
 
 from incpt.core.affine import Vector
 from incpt.core.checks import one_of, require, require_bool, whole
-from incpt.core.layout import TextureSlot
+from incpt.core.layout import MIN_ALPHA, TextureSlot
 from incpt.scene.checks import LARGEST, set_number, set_vector
 from incpt.scene.texture import Texture
 
@@ -148,6 +148,27 @@ class Material:
         return self.alpha_mode != "opaque"
 
     @property
+    def is_clear_wall(self) -> bool:
+        """Whether it is a thin wall that rays may go straight through, unchanged: smooth, white, the same
+        everywhere. Light samples find what is behind such a wall, as behind a cut-out."""
+        bare = all(texture_of(self, slot) is None for slot in _SEEN_BY_WALLS)
+        return (
+            self.is_transmissive
+            and self.thin_walled
+            and bare
+            and self.roughness**2 <= MIN_ALPHA
+            and self.base_color == self.specular_color == (1.0, 1.0, 1.0)
+            and self.iridescence == 0
+            and not any(self.emission)
+            and not self.is_cutout
+        )
+
+    @property
+    def passes_rays(self) -> bool:
+        """Whether rays may go through it before any shading."""
+        return self.is_cutout or self.is_clear_wall
+
+    @property
     def is_emissive(self) -> bool:
         """Whether light sampling may find it."""
         return any(c > 0 for c in self.emission) and not self.unlit
@@ -163,6 +184,11 @@ class Material:
         return self.is_transmissive and not self.thin_walled
 
 
+_SEEN_BY_WALLS = (
+    TextureSlot.BASE_COLOR, TextureSlot.METALLIC_ROUGHNESS, TextureSlot.NORMAL, TextureSlot.TRANSMISSION,
+    TextureSlot.SPECULAR, TextureSlot.SPECULAR_COLOR,
+)  # fmt: skip
+"""Slots that make what a smooth wall lets through differ from point to point."""
 _TEXTURE_NAMES = {slot: f"{slot.name.lower()}_texture" for slot in TextureSlot}
 
 

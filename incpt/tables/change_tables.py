@@ -121,7 +121,7 @@ def _changed_cutouts(scene: Scene, old: Scene, new: Scene, change: Change) -> li
     """The objects of a scene, which is one of the two, that have another material, by its name or by what it
     is, where either covers in part."""
     cutouts = {
-        name for materials in (old.materials, new.materials) for name, m in materials.items() if m.is_cutout
+        name for materials in (old.materials, new.materials) for name, m in materials.items() if m.passes_rays
     }
     if not cutouts:
         return []

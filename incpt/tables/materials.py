@@ -24,7 +24,12 @@ _COPIED = (
 )  # fmt: skip
 """What rows take over from materials as it is."""
 
-_NOT_OF_LAYERS = 1 << MaterialTrait.THIN_WALLED | 1 << MaterialTrait.DISPERSION | 1 << MaterialTrait.UNLIT
+_NOT_OF_LAYERS = (
+    1 << MaterialTrait.THIN_WALLED
+    | 1 << MaterialTrait.CLEAR_WALL
+    | 1 << MaterialTrait.DISPERSION
+    | 1 << MaterialTrait.UNLIT
+)
 """Traits that leave opaque surfaces as they are."""
 
 
@@ -37,7 +42,7 @@ class MaterialTables:
     is_matte         whether no surface that may be shaded as opaque has a specular layer or is metallic
     is_media_clear   whether none that lets light through absorbs any of it
     is_media_smooth  whether none that lets light through is rough
-    has_cutouts      whether any covers what is behind it in part only
+    has_cutouts      whether rays may go through any before it is shaded
     """
 
     buffers: Mapping[str, cl.Buffer]
@@ -63,6 +68,7 @@ def traits_of(material: Material) -> set[MaterialTrait]:
         MaterialTrait.IRIDESCENCE: material.iridescence > 0 and mirrors,
         MaterialTrait.DIFFUSE_TRANSMISSION: material.diffuse_transmission > 0,
         MaterialTrait.THIN_WALLED: material.is_transmissive and material.thin_walled,
+        MaterialTrait.CLEAR_WALL: material.is_clear_wall,
         MaterialTrait.DISPERSION: material.is_body and material.dispersion > 0,
     }
     return {trait for trait, holds in has.items() if holds}
@@ -84,12 +90,13 @@ def material_tables(
         for field in _COPIED:
             row[field] = getattr(material, field)
         # What covers in part is left to the rays that meet it, also where it is a lamp in the other scene.
-        row["light_pdf"] = 0.0 if material.is_cutout else densities.get(name, 0.0)
+        row["light_pdf"] = 0.0 if material.passes_rays else densities.get(name, 0.0)
         row["flags"] = (
             flags.DOUBLE_SIDED * (material.double_sided or material.unlit)
             | flags.TRANSMISSIVE * material.is_transmissive
             | flags.THIN_WALLED * material.thin_walled
             | flags.UNLIT * material.unlit
+            | flags.CLEAR_WALL * material.is_clear_wall
             | flags.CUTOUT * material.is_cutout
             | flags.MASKED * (material.alpha_mode == "mask")
         )
@@ -115,5 +122,5 @@ def material_tables(
         and traits & ~_NOT_OF_LAYERS == 0,
         is_media_clear=not any(any(material.absorption) for material in media),
         is_media_smooth=is_media_smooth,
-        has_cutouts=any(material.is_cutout for material in materials.values()),
+        has_cutouts=any(material.passes_rays for material in materials.values()),
     )

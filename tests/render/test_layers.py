@@ -43,6 +43,8 @@ WALL = Material(
 )  # fmt: skip
 """A wall absorbs nothing, whatever bodies of its material would."""
 PRISM = Material(WHITE, roughness=0.3, transmission=1, dispersion=4, ior=1.6)
+WINDOW = Material(WHITE, roughness=0, transmission=0.9, thin_walled=True)
+"""A clear wall."""
 SIGN = Material((0.9, 0.5, 0.2), unlit=True)
 
 
@@ -50,7 +52,7 @@ def room() -> Scene:
     """Something of everything, under a lamp, a light and a sky."""
     materials = {
         "lacquer": LACQUER, "cloth": CLOTH, "brushed": BRUSHED, "oil": OIL, "leaf": LEAF, "tinted": TINTED,
-        "wall": WALL, "prism": PRISM, "sign": SIGN, "lamp": Material(emission=(9, 9, 8)),
+        "wall": WALL, "prism": PRISM, "sign": SIGN, "window": WINDOW, "lamp": Material(emission=(9, 9, 8)),
     }  # fmt: skip
     objects = (
         Object("floor", shape("plane"), "tinted", scale=(8, 1, 8)),
@@ -61,6 +63,7 @@ def room() -> Scene:
         Object("leaf", shape("plane"), "leaf", (0.9, 0.7, -0.6), (50, 20, 0), (0.9, 1, 0.9)),
         Object("wall", shape("plane"), "wall", (-0.5, 0.6, 1.1), (80, 10, 0), (0.8, 1, 0.8)),
         Object("prism", shape("cube"), "prism", (1.7, 0.4, 0), (20, 40, 0), (0.6, 0.6, 0.6)),
+        Object("window", shape("plane"), "window", (1.1, 1.2, 0.6), (40, -30, 0), (1.2, 1, 0.9)),
         Object("sign", shape("plane"), "sign", (0, 1.5, -1.2), (90, 0, 0), (1.5, 1, 0.4)),
         Object("lamp", shape("plane"), "lamp", (0.5, 2.6, -0.6), (180, 0, 0), (0.8, 1, 0.8)),
     )
@@ -102,6 +105,7 @@ def test_each_technique_alone_gives_the_same(technique: str) -> None:
 FURNACE = {
     "thin wall": Material(WHITE, roughness=0, transmission=1, thin_walled=True),
     "half a wall": Material(WHITE, roughness=0.2, transmission=0.5, thin_walled=True),
+    "half a window": Material(WHITE, roughness=0, transmission=0.5, specular=0.7, thin_walled=True),
     "bubble": Material(WHITE, roughness=0, transmission=1, thin_walled=True, iridescence=1),
     "prism": Material(WHITE, roughness=0, transmission=1, dispersion=3),
     "iridescent glass": Material(WHITE, roughness=0, transmission=1, iridescence=1, iridescence_ior=1.8),
@@ -141,6 +145,58 @@ def test_the_pane_of_gltf_is_a_thin_wall() -> None:
     scene = Scene(Camera((0, 0, 3), (0, 0, 0), fov_y=2), Environment((0, 0, 0)), materials, objects)
     image = render(scene, 1024, size=(8, 8), transmission_bounces=8)
     np.testing.assert_allclose(image.mean(axis=(0, 1)), np.array([5, 2, 1]) * 0.96 / 1.04, rtol=0.01)
+
+
+@pytest.mark.parametrize("in_blocks", [True, False])
+def test_light_behind_a_window_is_sampled(in_blocks: bool) -> None:
+    """As much arrives through a clear wall as through one that is tinted by next to nothing, with a fraction
+    of the noise."""
+    if in_blocks and not traces_in_blocks(device()):
+        pytest.skip("no blocks on this device")
+    spread, mean = [], []
+    for tint in (1.0, 0.9999):
+        window = Material((tint,) * 3, roughness=0, transmission=1, thin_walled=True)
+        assert window.is_clear_wall == (tint == 1)
+        materials = {
+            "floor": Material((0.5, 0.5, 0.5), specular=0), "window": window,
+            "lamp": Material((0, 0, 0), specular=0, emission=(20, 20, 20)),
+        }  # fmt: skip
+        objects = (
+            Object("floor", shape("plane"), "floor", scale=(4, 1, 4)),
+            Object("window", shape("plane"), "window", (0, 1, 0), (10, 0, 0), (4, 1, 4)),
+            Object("lamp", shape("plane"), "lamp", (0, 2, 0), (180, 0, 0), (0.3, 1, 0.3)),
+        )
+        scene = Scene(
+            Camera((0, 0.6, 1.4), (0, 0, 0), fov_y=50), Environment((0, 0, 0)), materials, objects,
+            small_settings(size=(16, 16), max_bounces=1, transmission_bounces=8),
+        )  # fmt: skip
+        images = [pixels(scene, 64, in_blocks, seed=seed) for seed in range(8)]
+        spread.append(float(np.std(images, axis=0).mean()))
+        mean.append(float(np.mean(images)))
+    assert mean[0] == pytest.approx(mean[1], rel=0.05)
+    assert spread[0] < 0.3 * spread[1]
+
+
+def test_a_window_mirrors_as_much_as_both_of_its_sides() -> None:
+    """At 45 degrees, a lamp."""
+    materials = {"window": WINDOW, "lamp": Material((0, 0, 0), specular=0, emission=(5, 5, 5))}
+    materials["window"] = replace(WINDOW, transmission=1)
+    objects = (
+        Object("window", shape("plane"), "window", scale=(3, 1, 3)),
+        Object("lamp", shape("plane"), "lamp", (2, 2, 0), (0, 0, 135), (1, 1, 1)),
+    )
+    scene = Scene(Camera((-2, 2, 0), (0, 0, 0), fov_y=1), Environment((0, 0, 0)), materials, objects)
+    image = render(scene, 1024, size=(8, 8), transmission_bounces=4)
+    c, inside = np.sqrt(0.5), np.sqrt(1 - 0.5 / 1.5**2)
+    across, along = (c - 1.5 * inside) / (c + 1.5 * inside), (1.5 * c - inside) / (1.5 * c + inside)
+    f = (across**2 + along**2) / 2
+    np.testing.assert_allclose(image.mean(), 5 * 2 * f / (1 + f), rtol=0.02)
+
+
+def test_a_window_is_picked_and_not_what_is_behind() -> None:
+    scene = room().with_object("window", position=(0, 0.5, 1.5), rotation=(90, 0, 0), scale=(9, 1, 9))
+    session = Session(scene, device=device())
+    assert {session.pick(at) for at in ((5, 5), (22, 14), (30, 9), (40, 2))} == {"window"}
 
 
 def test_a_sheet_is_as_bright_behind_as_it_lets_through() -> None:
@@ -335,6 +391,8 @@ EDITS: dict[str, Callable[[Scene], Scene]] = {
     "tint": lambda s: s.with_material("tinted", specular_color=(0.2, 1, 3)),
     "wall": lambda s: s.with_material("wall", thin_walled=False),
     "prism": lambda s: s.with_material("prism", dispersion=0.5),
+    "frost a window": lambda s: s.with_material("window", roughness=0.4),
+    "move a window": lambda s: s.with_object("window", position=(0.7, 1.0, 0.8)),
     "sign": lambda s: s.with_material("sign", unlit=False),
     "move a leaf": lambda s: s.with_object("leaf", position=(0.6, 0.9, -0.4)),
 }

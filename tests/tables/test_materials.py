@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-from support.parameters import NAMES, TEXTURES, unlike_default
+from support.parameters import A_TEXTURE, NAMES, TEXTURES, unlike_default
 
 from incpt.core import layout
 from incpt.core.layout import MaterialFlag, MaterialTrait
@@ -133,9 +134,33 @@ def test_traits_are_those_of_some_material(device: Device, trait: MaterialTrait)
         MaterialTrait.IRIDESCENCE: {"iridescence": 0.1},
         MaterialTrait.DIFFUSE_TRANSMISSION: {"diffuse_transmission": 0.1},
         MaterialTrait.THIN_WALLED: {"thin_walled": True, "transmission": 0.5},
+        MaterialTrait.CLEAR_WALL: {
+            "thin_walled": True,
+            "transmission": 0.5,
+            "roughness": 0,
+            "base_color": (1, 1, 1),
+        },
         MaterialTrait.DISPERSION: {"dispersion": 0.1, "transmission": 0.5},
         MaterialTrait.UNLIT: {"unlit": True, "transmission": 1.0},
     }
     made = tables(device, MATTE, Material(**values[trait]))
-    assert made.traits == 1 << trait and tables(device, MATTE, Material()).traits == 0
-    assert made.has_media == (trait in (MaterialTrait.THIN_WALLED, MaterialTrait.DISPERSION))
+    with_it = 1 << MaterialTrait.THIN_WALLED if trait is MaterialTrait.CLEAR_WALL else 0
+    assert made.traits == 1 << trait | with_it and tables(device, MATTE, Material()).traits == 0
+    media = (MaterialTrait.THIN_WALLED, MaterialTrait.CLEAR_WALL, MaterialTrait.DISPERSION)
+    assert made.has_media == (trait in media)
+    assert made.has_cutouts == (trait is MaterialTrait.CLEAR_WALL)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"roughness": 0.3}, {"base_color": (1, 1, 0.9)}, {"thin_walled": False}, {"iridescence": 0.5},
+        {"specular_color": (1, 0.5, 1)}, {"emission": (1, 0, 0)}, {"alpha_mode": "blend"}, {"unlit": True},
+        {"normal_texture": A_TEXTURE}, {"transmission_texture": A_TEXTURE}, {"transmission": 0.0},
+    ],
+    ids=lambda values: next(iter(values)),
+)  # fmt: skip
+def test_rays_go_straight_through_clear_walls_only(values: dict[str, Any]) -> None:
+    clear = Material((1, 1, 1), roughness=0, transmission=0.8, thin_walled=True)
+    assert clear.is_clear_wall and clear.passes_rays
+    assert not replace(clear, **values).is_clear_wall
