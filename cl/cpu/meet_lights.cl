@@ -1,4 +1,5 @@
 #include "cpu/interleaved.cl"
+#include "path/light_choice.cl"
 #include "path/light_search.cl"
 
 // The light tree for blocks of paths: a few rays, or a few choices of lights, take turns, so that one does

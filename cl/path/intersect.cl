@@ -2,6 +2,7 @@
 #include "path/tangents.cl"
 #include "path/trace.cl"
 #include "path/light_search.cl"
+#include "path/shade_light.cl"
 
 #if defined(CUTOUTS) || defined(SHAPED_LIGHTS) || defined(TANGENTS)
 #define NEEDS_SHADING

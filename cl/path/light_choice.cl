@@ -1,7 +1,4 @@
-#include "path/chosen_light.cl"
-#ifdef SHAPED_LIGHTS
-#include "scene/shaped_light.cl"
-#endif
+#include "path/met_light.cl"
 
 // What is done with the light tree where rays have ended on surfaces: the lights that they have met get their
 // density, and lights are chosen for those paths that go on. This is a stage of its own, because lanes are
@@ -14,38 +11,7 @@ INLINE Vec3 start_of_ray(const State *state, uint path, const Surface *surface) 
     return along(surface->position, -surface->distance, direction);
 }
 
-INLINE uint load_normal(const State *state, uint path) {
-    return load_bits(state->paths, PATH_NORMAL * STRIDE(state) + path);
-}
-
-INLINE float load_bsdf_pdf(const State *state, uint path) {
-    return state->paths[PATH_BSDF_PDF * STRIDE(state) + path];
-}
-
-// Weighs a light that a path's ray has met with the chance of choosing it from where the ray came, `from`.
-// Only the proportion of both densities counts, and that of light sampling is known but for this factor: it
-// stays, and the other one is divided. With a chance of 0 no sample could have found the light.
-INLINE void weigh_met_light(const Params *params, const Emitters *emitters, const State *state, uint path,
-                            Vec3 from, uint trail, float factor) {
-    const Receiver receiver = receiver_at(from, load_normal(state, path));
-    const float chance =
-        factor * params->tree_probability * chance_of_light(params, emitters, &receiver, trail);
-    const float pdf = load_bsdf_pdf(state, path);
-    state->paths[PATH_BSDF_PDF * STRIDE(state) + path] = chance > 0.0f ? pdf / chance : 0.0f;
-}
-
-#ifdef SHAPED_LIGHTS
-// The same of a light that is an object of its own, for a ray that starts at `origin`.
-INLINE void weigh_met_shaped_light(const Params *params, const Emitters *emitters, const State *state,
-                                   uint path, Vec3 origin, uint light) {
-    if (load_bsdf_pdf(state, path) > 0.0f)
-        weigh_met_light(params, emitters, state, path, origin,
-                        shaped_bits(params, emitters, SHAPED_TRAIL, light), 1.0f);
-}
-
-#endif
-
-// The same of the emissive triangle that a path stands on, if it does.
+// As weigh_met_shaped_light, of the emissive triangle that a path stands on, if it does.
 INLINE void weigh_met_triangle(const Params *params, const Shading *shading, const Emitters *emitters,
                                const State *state, uint path, const Surface *surface) {
 #ifdef TRIANGLE_LIGHTS

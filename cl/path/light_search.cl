@@ -1,6 +1,5 @@
 #include "accel/bvh.cl"
-#include "path/light_choice.cl"
-#include "path/shade_light.cl"
+#include "path/met_light.cl"
 
 // What rays meet of lights that are objects of their own, by the boxes of the light tree. For rays one by
 // one; those of a block take turns (cpu/meet_lights.cl).

@@ -133,4 +133,4 @@ def test_kernels_get_the_features_that_they_ask_for() -> None:
         has = set(wavefront._FEATURES.get(kernel, ()))
         assert asked == has & scene_has, kernel
         if "surface_material(const" in text:
-            assert {"TEXTURES", "VERTEX_COLORS"} <= has, kernel
+            assert {"TEXTURES", "VERTEX_COLORS", "TRAITS"} <= has, kernel
