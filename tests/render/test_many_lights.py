@@ -146,7 +146,7 @@ def test_the_tree_changes_no_mean(name: str, trees: Callable[[bool], None]) -> N
 
 
 @pytest.mark.parametrize("technique", ["MIS_ONLY_LIGHT", "MIS_ONLY_BSDF"])
-@pytest.mark.parametrize("name", ["mixed", "lamps", "triangles"])
+@pytest.mark.parametrize("name", ["mixed", "triangles"])
 def test_both_techniques_find_the_same(name: str, technique: str, trees: Callable[[bool], None]) -> None:
     """Of lights that rays can find: each technique alone has the mean of both together."""
     trees(True)
@@ -161,8 +161,8 @@ def test_both_techniques_find_the_same(name: str, technique: str, trees: Callabl
         for key, one in scene.materials.items()
     }
     scene = replace(scene, lights=lights, materials=rough)
-    both = repeat(scene, 256, max_bounces=1)
-    alone = repeat(scene, 1024, max_bounces=1, on=Device(features=(technique,)))
+    both = repeat(scene, 128, max_bounces=1)
+    alone = repeat(scene, 512, max_bounces=1, on=Device(features=(technique,)))
     assert_same_mean(both, alone, relative=0.02)
 
 
