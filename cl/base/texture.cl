@@ -2,7 +2,7 @@
 #include "base/scalar.cl"
 
 // Images on surfaces. All pixels of a device lie in one buffer of words, in the form that files have: bytes,
-// or half floats where there is more to them than bytes hold (tables/texture_pool.py). This is straight-line
+// or half floats where there is more to them than bytes hold (tables/textures.py). This is straight-line
 // code of scalars, so that PoCL runs it in SIMD lanes.
 
 typedef struct {
@@ -94,8 +94,9 @@ INLINE Texel sample_texture(const Shading *shading, uint number, const Uvs *uvs)
     return texel_between(upper, lower, ty);
 }
 
-// A texture of emission, which is not below 0: images of floats may hold anything.
-INLINE Vec3 emission_texel(const Shading *shading, uint number, const Uvs *uvs) {
+// The colour of a texture that may be above 1, as that of emission, but not below 0: images of floats may
+// hold anything.
+INLINE Vec3 bright_texel(const Shading *shading, uint number, const Uvs *uvs) {
     Vec3 color = sample_texture(shading, number, uvs).color;
     return vec3(MAX(color.x, 0.0f), MAX(color.y, 0.0f), MAX(color.z, 0.0f));
 }

@@ -32,7 +32,8 @@ INLINE HitPoint hit_point(const Geometry *geometry, const RawHit *hit) {
     return point;
 }
 
-// The share of the ray's light that ends at a point: 1, or 0, where the material has a mask.
+// The share of the ray's light that ends at a point: 1, or 0, where the material has a mask. `cosine` is that
+// of the angle between ray and normal, by which clear walls mirror.
 INLINE float coverage_at(const Geometry *geometry, const Shading *shading, const HitPoint *point,
                          float cosine) {
     __global const Material *material = &shading->materials[geometry->objects[point->object].material];

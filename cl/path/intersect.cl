@@ -65,7 +65,7 @@ __kernel __attribute__((vec_type_hint(float8))) void intersect(LAUNCH_PARAMETERS
         return;
     }
     Surface surface = surface_at(&geometry, &hit);
-#if defined(TANGENTS)
+#ifdef TANGENTS
     set_tangents(objects, &shading, &surface);
 #endif
     store_surface(&state, path, &surface);

@@ -90,8 +90,9 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
     int part = (near_spread + far_spread > 0.0f) & (!opaque) & (!covered);
     float hue = uniform_2d(seed, p.sample, PAIR_CHANNEL(p.ray)).u;
     float channel = follow_channel(&throughput, hue, part);
-    near_ior += channel * near_spread;
-    far_ior += channel * far_spread;
+    // No colour is faster than light in a vacuum.
+    near_ior = MAX(near_ior + channel * near_spread, 1.0f);
+    far_ior = MAX(far_ior + channel * far_spread, 1.0f);
 #endif
     boundary.eta = far_ior / near_ior;
 #if HAS_TRAIT(THIN_WALLED)
@@ -118,10 +119,10 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
     BsdfSample next = sample_smooth_boundary(&boundary, wo, choices.u);
     int smooth = 1;
 #ifndef SMOOTH_MEDIA
-    // Without a step in IOR there is nothing to scatter at, however rough the boundary is.
     boundary.gain =
         LERP(1.0f, rough_gain(&boundary, material.roughness, wo.z, shading->glass, shading->albedos),
              params->multiple_scattering);
+    // Without a step in IOR there is nothing to scatter at, however rough the boundary is.
     smooth = (material.roughness * material.roughness <= MIN_ALPHA) | (FABS(boundary.eta - 1.0f) < 1e-5f);
 #ifdef LIGHT_SAMPLING
     // Light sampling, where the boundary has a density for it.

@@ -236,11 +236,7 @@ INLINE float orient_surface(Surface *surface, Vec3 direction, int mirrors) {
     surface->shading = select(mirrors, mirroring, towards);
 #endif
 #ifdef COAT_NORMALS
-    Vec3 coat = scale(side, surface->coat);
-#ifndef FLAT
-    coat = mirroring_normal(coat, surface->geometric, scale(-1.0f, direction));
-#endif
-    surface->coat = coat;
+    surface->coat = mirroring_normal(scale(side, surface->coat), surface->geometric, scale(-1.0f, direction));
 #endif
     return facing;
 }

@@ -5,8 +5,7 @@
 // The material at a point of a surface: its numbers times what its textures and the colours at corners say.
 // What no material of the scene has is not asked for.
 
-INLINE Vec3 not_negative(Vec3 c) { return vec3(MAX(c.x, 0.0f), MAX(c.y, 0.0f), MAX(c.z, 0.0f)); }
-
+// Numbers from 0 to 1.
 INLINE Vec3 shares(Vec3 c) {
     return vec3(CLAMP(c.x, 0.0f, 1.0f), CLAMP(c.y, 0.0f, 1.0f), CLAMP(c.z, 0.0f, 1.0f));
 }
@@ -33,7 +32,7 @@ INLINE SurfaceMaterial surface_material(const Shading *shading, const Surface *s
     m.metallic *= rough.z;
 #endif
 #if TEXTURED(EMISSION)
-    m.emission = mul(m.emission, emission_texel(shading, textures[SLOT_OF_EMISSION], &uvs));
+    m.emission = mul(m.emission, bright_texel(shading, textures[SLOT_OF_EMISSION], &uvs));
 #endif
 #if TEXTURED(TRANSMISSION)
     m.transmission *= sample_texture(shading, textures[SLOT_OF_TRANSMISSION], &uvs).color.x;
@@ -42,8 +41,7 @@ INLINE SurfaceMaterial surface_material(const Shading *shading, const Surface *s
     m.specular *= sample_texture(shading, textures[SLOT_OF_SPECULAR], &uvs).alpha;
 #endif
 #if TEXTURED(SPECULAR_COLOR)
-    Vec3 tint = sample_texture(shading, textures[SLOT_OF_SPECULAR_COLOR], &uvs).color;
-    m.specular_color = mul(m.specular_color, not_negative(tint));
+    m.specular_color = mul(m.specular_color, bright_texel(shading, textures[SLOT_OF_SPECULAR_COLOR], &uvs));
 #endif
 #if TEXTURED(CLEARCOAT)
     m.clearcoat *= sample_texture(shading, textures[SLOT_OF_CLEARCOAT], &uvs).color.x;

@@ -185,7 +185,7 @@ INLINE LightSample sample_triangle_point(const Params *params, const Shading *sh
 #if TEXTURED(EMISSION)
     uint texture = ((__global const uint *)lights)[LIGHT_TEXTURE * stride + light];
     Uvs uvs = light_uvs(lights, stride, light, b1, b2);
-    result.radiance = mul(result.radiance, emission_texel(shading, texture, &uvs));
+    result.radiance = mul(result.radiance, bright_texel(shading, texture, &uvs));
 #endif
     result.pdf = valid ? lights[LIGHT_PDF_AREA * stride + light] * squared * inverse_facing : 0.0f;
     return result;

@@ -121,11 +121,7 @@ INLINE float rough_gain(const Boundary *b, float roughness, float cosine, __glob
                   glass_albedo(first + (GLASS_STEPS + 1u) * GLASS_ROW, u, b->specular), t),
              s);
 #if HAS_TRAIT(THIN_WALLED)
-    AlbedoRows row = rows_at(rows, roughness);
-    float place = CLAMP(cosine, 0.0f, 1.0f) * (float)(ALBEDO_TABLE_SIZE - 1u);
-    uint cell = MIN((uint)place, ALBEDO_TABLE_SIZE - 2u);
-    float wall = LERP(between_rows(row, cell), between_rows(row, cell + 1u), place - (float)cell);
-    albedo = is_thin(b) ? wall : albedo;
+    albedo = is_thin(b) ? albedo_at(rows_at(rows, roughness), 0u, cosine) : albedo;
 #endif
     return 1.0f / MAX(albedo, 0.1f);
 }

@@ -26,9 +26,8 @@
 typedef struct {
     OpaqueBsdf base;
     Vec3 coat_normal, sheen_color;
-    __global const float *coat_albedos, *sheen_albedos; // the rows below and above their roughness
-    float coat_share, sheen_share;                      // of the upper row
-    float coat, coat_alpha, sheen, sheen_alpha;         // `sheen` is the largest of its colour
+    AlbedoRows coat_rows, sheen_rows;
+    float coat, coat_alpha, sheen, sheen_alpha; // `sheen` is the largest of its colour
 } LayeredBsdf;
 
 // `coat_normal` is local to the frame of the base.
@@ -37,41 +36,25 @@ INLINE LayeredBsdf layered_bsdf(const SurfaceMaterial *m, AlbedoTables tables, f
     LayeredBsdf s;
     s.base = bsdf_of(m, tables, multiple);
     s.coat_normal = coat_normal;
-    float place = CLAMP(m->clearcoat_roughness, 0.0f, 1.0f) * (float)(ALBEDO_TABLE_SIZE - 1u);
-    uint row = MIN((uint)place, ALBEDO_TABLE_SIZE - 2u);
-    s.coat_albedos = tables.all + row * ALBEDO_ROW_SIZE;
-    s.coat_share = place - (float)row;
+    s.coat_rows = rows_at(tables.all, m->clearcoat_roughness);
     s.coat = m->clearcoat;
     s.coat_alpha = MAX(m->clearcoat_roughness * m->clearcoat_roughness, MIN_ALPHA);
-    place = CLAMP(m->sheen_roughness, 0.0f, 1.0f) * (float)(ALBEDO_TABLE_SIZE - 1u);
-    row = MIN((uint)place, ALBEDO_TABLE_SIZE - 2u);
-    s.sheen_albedos = tables.all + row * ALBEDO_ROW_SIZE + 2u * ALBEDO_TABLE_SIZE + 2u;
-    s.sheen_share = place - (float)row;
+    s.sheen_rows = rows_at(tables.all, m->sheen_roughness);
     s.sheen_color = m->sheen_color;
     s.sheen = largest(m->sheen_color);
     s.sheen_alpha = MAX(m->sheen_roughness * m->sheen_roughness, MIN_SHEEN_ALPHA);
     return s;
 }
 
-// A column of the table of albedos, between its cosines, or roots of them, and its rows.
-INLINE float albedo_at(__global const float *column, float row_share, float cosine) {
-    float place = CLAMP(cosine, 0.0f, 1.0f) * (float)(ALBEDO_TABLE_SIZE - 1u);
-    uint cell = MIN((uint)place, ALBEDO_TABLE_SIZE - 2u);
-    float t = place - (float)cell;
-    float lower = LERP(column[cell], column[cell + 1u], t);
-    column += ALBEDO_ROW_SIZE;
-    return LERP(lower, LERP(column[cell], column[cell + 1u], t), row_share);
-}
-
 INLINE float coat_albedo(const LayeredBsdf *s, float cosine) {
-    float all = albedo_at(s->coat_albedos, s->coat_share, cosine);
-    float grazing = albedo_at(s->coat_albedos + ALBEDO_TABLE_SIZE, s->coat_share, cosine);
+    float all = albedo_at(s->coat_rows, 0u, cosine);
+    float grazing = albedo_at(s->coat_rows, ALBEDO_TABLE_SIZE, cosine);
     return s->coat * (CLEARCOAT_F0 * (all - grazing) + grazing);
 }
 
 // Of white sheen; it may be above 1.
 INLINE float sheen_albedo(const LayeredBsdf *s, float cosine) {
-    return albedo_at(s->sheen_albedos, s->sheen_share, SQRT(CLAMP(cosine, 0.0f, 1.0f)));
+    return albedo_at(s->sheen_rows, 2u * ALBEDO_TABLE_SIZE + 2u, SQRT(CLAMP(cosine, 0.0f, 1.0f)));
 }
 
 // Lambda of Smith's masking, the fit of Estevez and Kulla: between that of a narrow and of a wide

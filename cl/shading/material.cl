@@ -91,6 +91,14 @@ INLINE float between_rows(AlbedoRows rows, uint place) {
     return LERP(rows.first[place], rows.first[ALBEDO_ROW_SIZE + place], rows.share);
 }
 
+// A column of the table, which begins at that place of its rows, between its cosines, or roots of them.
+INLINE float albedo_at(AlbedoRows rows, uint column, float cosine) {
+    float place = CLAMP(cosine, 0.0f, 1.0f) * (float)(ALBEDO_TABLE_SIZE - 1u);
+    uint cell = MIN((uint)place, ALBEDO_TABLE_SIZE - 2u);
+    return LERP(between_rows(rows, column + cell), between_rows(rows, column + cell + 1u),
+                place - (float)cell);
+}
+
 #if HAS_TRAIT(ANISOTROPY)
 // The same in the table of stretched reflections: four rows, for two roughnesses across and two steps.
 typedef struct {
@@ -260,18 +268,13 @@ INLINE float layer_albedo(const OpaqueBsdf *s, Vec3 w) {
     float grazing = LERP(stretched_albedo(s->stretched, 6u * column, along, 1u),
                          stretched_albedo(s->stretched, 6u * column + 6u, along, 1u), share);
     float albedo = s->share_a * all + s->share_b * grazing;
+#elif defined(TEXTURED_LAYER)
+    float albedo = s->share_a * albedo_at(s->rows, 0u, FABS(w.z)) +
+                   s->share_b * albedo_at(s->rows, ALBEDO_TABLE_SIZE, FABS(w.z));
 #else
     float place = MIN(FABS(w.z), 1.0f) * (float)(ALBEDO_TABLE_SIZE - 1u);
     uint cell = MIN((uint)place, ALBEDO_TABLE_SIZE - 2u);
-    float t = place - (float)cell;
-#ifdef TEXTURED_LAYER
-    float a = LERP(between_rows(s->rows, cell), between_rows(s->rows, cell + 1u), t);
-    cell += ALBEDO_TABLE_SIZE;
-    float b = LERP(between_rows(s->rows, cell), between_rows(s->rows, cell + 1u), t);
-    float albedo = s->share_a * a + s->share_b * b;
-#else
-    float albedo = LERP(s->layer[cell], s->layer[cell + 1u], t);
-#endif
+    float albedo = LERP(s->layer[cell], s->layer[cell + 1u], place - (float)cell);
 #endif
 #if HAS_TRAIT(IRIDESCENCE)
     float cosine = FABS(w.z);

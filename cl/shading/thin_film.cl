@@ -32,11 +32,12 @@ INLINE Vec3 wave_color(float path, float turns) {
                 0.052887f * x - 0.204026f * y + 1.151139f * z);
 }
 
-// One channel of the reflectance below the film, seen from inside of it, and whether it turns the phase over.
-INLINE float below_film(float f0, float ior, float cosine, float *turns) {
+// One channel of the reflectance below the film, seen from inside of it, and -1 where that turns the phase
+// over, else 1.
+INLINE float below_film(float f0, float ior, float cosine, float *sign) {
     float root = SQRT(MIN(f0, 0.9999f));
     float base_ior = (1.0f + root) / (1.0f - root);
-    *turns = base_ior < ior ? 0.5f : 0.0f;
+    *sign = base_ior < ior ? -1.0f : 1.0f;
     return fresnel_dielectric(cosine, base_ior / ior);
 }
 
@@ -60,14 +61,12 @@ INLINE Vec3 film_reflectance(const ThinFilm *film, float cosine) {
     float inside = SQRT(MAX(1.0f - (1.0f - c * c) / (ior * ior), 0.0f));
     float outer = fresnel_dielectric(c, ior);
     float path = 2.0f * ior * film->thickness * inside;
-    float turns_r, turns_g, turns_b;
-    float inner_r = below_film(film->f0.x, ior, inside, &turns_r);
-    float inner_g = below_film(film->f0.y, ior, inside, &turns_g);
-    float inner_b = below_film(film->f0.z, ior, inside, &turns_b);
+    float sign_r, sign_g, sign_b;
+    float inner_r = below_film(film->f0.x, ior, inside, &sign_r);
+    float inner_g = below_film(film->f0.y, ior, inside, &sign_g);
+    float inner_b = below_film(film->f0.z, ior, inside, &sign_b);
     // Half a turn at the upper side, seen from below. Two ways turn the phase by whole turns.
     Vec3 odd = wave_color(path, 0.5f), twice = wave_color(2.0f * path, 0.0f);
-    float sign_r = turns_r > 0.0f ? -1.0f : 1.0f, sign_g = turns_g > 0.0f ? -1.0f : 1.0f;
-    float sign_b = turns_b > 0.0f ? -1.0f : 1.0f;
     Vec3 sum = vec3(airy_sum(outer, inner_r, sign_r * odd.x, twice.x),
                     airy_sum(outer, inner_g, sign_g * odd.y, twice.y),
                     airy_sum(outer, inner_b, sign_b * odd.z, twice.z));

@@ -553,7 +553,9 @@ class SlotFlag(IntFlag):
 
 
 class MaterialFlag(IntFlag):
-    """Properties of a material that choose a kernel or a branch. CUTOUT: it covers a share of what is behind
+    """Properties of a material that choose a kernel or a branch. THIN_WALLED: where it is transmissive it
+    encloses nothing; CLEAR_WALL: rays go straight through it, see `Material.is_clear_wall`; UNLIT: it shines
+    with its base colour. CUTOUT: it covers a share of what is behind
     it, alpha; MASKED: all where alpha is at least the cutoff, and nothing elsewhere."""
 
     DOUBLE_SIDED = 1

@@ -32,7 +32,7 @@ Array = npt.NDArray[np.floating]
 
 _SAMPLES = 1024
 _STRETCHED_SAMPLES = _GLASS_SAMPLES = 512
-_SHEEN_COSINES, _SHEEN_ANGLES = 256, 48
+_SHEEN_COSINES, _SHEEN_ANGLES = 128, 32
 """Points of the sums over the hemisphere."""
 
 

@@ -18,6 +18,7 @@ import pyopencl as cl
 
 from incpt.core import layout
 from incpt.core.affine import Vector
+from incpt.core.layout import TextureSlot
 from incpt.scene.change import Change, diff
 from incpt.scene.enclosing import transparent_bodies_around
 from incpt.scene.material import Material
@@ -176,7 +177,8 @@ class SceneTables:
 
     @cached_property
     def _is_flat(self) -> bool:
-        return all(mesh.normals is None for mesh in self.meshes)
+        bends = self.textures.has(TextureSlot.NORMAL) or self.textures.has(TextureSlot.CLEARCOAT_NORMAL)
+        return not bends and all(mesh.normals is None for mesh in self.meshes)
 
     @property
     def _has_image_light(self) -> bool:
