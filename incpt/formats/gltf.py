@@ -17,6 +17,7 @@ from incpt.core.errors import InputError, InputWarning, in_place, reason_of
 from incpt.core.files import check_readable, read_bytes
 from incpt.formats.gltf_data import GltfData
 from incpt.formats.vertex_attributes import VertexAttributes
+from incpt.scene.checks import LARGEST, checked_number
 from incpt.scene.material import (
     LARGEST_CUTOFF,
     LARGEST_DISPERSION,
@@ -169,6 +170,9 @@ def _gltf_material(table: dict[str, Any], data: GltfData, label: str) -> Materia
     def factor(extension: str, key: str, default: Any) -> Any:
         return extensions.get(f"KHR_materials_{extension}", {}).get(key, default)
 
+    def number(extension: str, key: str, default: float) -> float:
+        return checked_number(key, factor(extension, key, default), -LARGEST, LARGEST)
+
     def texture(of: dict[str, Any] | None) -> Texture | None:
         try:
             return None if of is None else data.texture(of)
@@ -182,7 +186,7 @@ def _gltf_material(table: dict[str, Any], data: GltfData, label: str) -> Materia
     def normal_scale(of: dict[str, Any] | None) -> float:
         return float(np.clip((of or {}).get("scale", 1.0), -LARGEST_SLOPE, LARGEST_SLOPE))
 
-    transmission = factor("transmission", "transmissionFactor", 0.0)
+    transmission = number("transmission", "transmissionFactor", 0.0)
     strength = factor("emissive_strength", "emissiveStrength", 1.0)
     distance = factor("volume", "attenuationDistance", np.inf)
     attenuation = np.clip(factor("volume", "attenuationColor", [1.0, 1.0, 1.0]), 1e-6, 1.0)
@@ -193,25 +197,25 @@ def _gltf_material(table: dict[str, Any], data: GltfData, label: str) -> Materia
         specular=factor("specular", "specularFactor", 1.0),
         ior=factor("ior", "ior", 1.5),
         transmission=transmission,
-        thin_walled=transmission > 0 and not factor("volume", "thicknessFactor", 0.0) > 0,
-        dispersion=min(factor("dispersion", "dispersion", 0.0), LARGEST_DISPERSION),
-        specular_color=tuple(factor("specular", "specularColorFactor", [1.0, 1.0, 1.0])),
+        thin_walled=transmission > 0 and not number("volume", "thicknessFactor", 0.0) > 0,
+        dispersion=min(number("dispersion", "dispersion", 0.0), LARGEST_DISPERSION),
+        specular_color=factor("specular", "specularColorFactor", (1.0, 1.0, 1.0)),
         clearcoat=factor("clearcoat", "clearcoatFactor", 0.0),
         clearcoat_roughness=factor("clearcoat", "clearcoatRoughnessFactor", 0.0),
         clearcoat_normal_scale=normal_scale(factor("clearcoat", "clearcoatNormalTexture", None)),
-        sheen_color=tuple(factor("sheen", "sheenColorFactor", [0.0, 0.0, 0.0])),
+        sheen_color=factor("sheen", "sheenColorFactor", (0.0, 0.0, 0.0)),
         sheen_roughness=factor("sheen", "sheenRoughnessFactor", 0.0),
         anisotropy=factor("anisotropy", "anisotropyStrength", 0.0),
-        anisotropy_rotation=float(np.degrees(factor("anisotropy", "anisotropyRotation", 0.0))),
+        anisotropy_rotation=float(np.degrees(number("anisotropy", "anisotropyRotation", 0.0)) % 360),
         iridescence=factor("iridescence", "iridescenceFactor", 0.0),
         iridescence_ior=factor("iridescence", "iridescenceIor", 1.3),
-        iridescence_thickness=min(factor("iridescence", "iridescenceThicknessMaximum", 400.0), THICKEST_FILM),
+        iridescence_thickness=min(number("iridescence", "iridescenceThicknessMaximum", 400.0), THICKEST_FILM),
         iridescence_least_thickness=min(
-            factor("iridescence", "iridescenceThicknessMinimum", 100.0), THICKEST_FILM
+            number("iridescence", "iridescenceThicknessMinimum", 100.0), THICKEST_FILM
         ),
         diffuse_transmission=factor("diffuse_transmission", "diffuseTransmissionFactor", 0.0),
-        diffuse_transmission_color=tuple(
-            factor("diffuse_transmission", "diffuseTransmissionColorFactor", [1.0, 1.0, 1.0])
+        diffuse_transmission_color=factor(
+            "diffuse_transmission", "diffuseTransmissionColorFactor", (1.0, 1.0, 1.0)
         ),
         unlit="KHR_materials_unlit" in extensions,
         absorption=tuple((-np.log(attenuation) / distance).tolist()),

@@ -246,6 +246,22 @@ def test_the_thickness_of_a_volume_decides_between_wall_and_body(
     assert made is not None and made.thin_walled is is_thin
 
 
+@pytest.mark.parametrize(
+    ("extension", "key"),
+    [
+        ("transmission", "transmissionFactor"), ("volume", "thicknessFactor"), ("dispersion", "dispersion"),
+        ("anisotropy", "anisotropyRotation"), ("iridescence", "iridescenceThicknessMaximum"),
+        ("clearcoat", "clearcoatFactor"), ("sheen", "sheenColorFactor"),
+    ],
+)  # fmt: skip
+def test_what_is_no_number_is_told_with_its_material(tmp_path: Path, extension: str, key: str) -> None:
+    extensions = {"KHR_materials_transmission": {"transmissionFactor": 1.0}}
+    extensions[f"KHR_materials_{extension}"] = {key: "much"}  # type: ignore[dict-item]
+    path = Writer().write_gltf(tmp_path / "a.gltf", {}, {"name": "paint", "extensions": extensions})
+    with pytest.raises(InputError, match=r"material 'paint': .*'much'"):
+        mesh_files.load_parts(path)
+
+
 def test_placements_turn_tangents_too(tmp_path: Path) -> None:
     """A quarter turn about z, mirrored in y: the side of v changes."""
     for scale, side in (([1, 1, 1], 1), ([1, -1, 1], -1)):
