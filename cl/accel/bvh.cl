@@ -8,6 +8,7 @@
 // a zero direction overflow to NaN, the order of operands in BVH_MIN8 and BVH_MAX8 leaves that axis out.
 
 #include "accel/slab.cl"
+#include "base/lanes8.cl"
 
 #define BVH_STACK_SIZE ((BVH_WIDTH - 1) * BVH_MAX_DEPTH + 1)
 #define BVH_TOP_STACK_SIZE (2 * BVH_STACK_SIZE) // below a tree over objects there may be one over packs
@@ -18,11 +19,9 @@
 // All functions are inlined by force, and bit operations are the compiler's own where it has them, because in
 // PoCL a call in the inner loop spills every vector register.
 #ifdef __clang__
-#define BVH_COUNT_BITS(x) ((uint)__builtin_popcount(x))
 #define BVH_FIRST_BIT(x) ((uint)__builtin_ctz(x))
 #define BVH_LIKELY(x) __builtin_expect(x, 1)
 #else
-#define BVH_COUNT_BITS(x) popcount(x)
 #define BVH_FIRST_BIT(x) (31u - clz((x) & (0u - (x))))
 #define BVH_LIKELY(x) (x)
 #endif
@@ -58,18 +57,6 @@ typedef struct {
 #else
 #define COUNT_VISIT(hit, counter)
 #endif
-
-// Bit i is set where lane i of a comparison holds.
-INLINE uint bvh_lanes(const int8 comparison) {
-#if defined(__AVX__) && defined(__clang__)
-    return (uint)__builtin_ia32_movmskps256(as_float8(comparison));
-#else
-    const int8 bit = comparison & (int8)(1, 2, 4, 8, 16, 32, 64, 128);
-    const int4 four = bit.lo | bit.hi;
-    const int2 two = four.lo | four.hi;
-    return (uint)(two.x | two.y);
-#endif
-}
 
 // The largest component of a direction, and the other two, which are x and y of the triangle test.
 INLINE uint bvh_main_axis(Vec3 direction) {
@@ -139,7 +126,7 @@ INLINE void bvh_box_distances(const BvhRay *ray, __global const Node *node, floa
 INLINE uint bvh_boxes(const BvhRay *ray, __global const Node *node, float limit, float8 *entry) {
     float8 exit;
     bvh_box_distances(ray, node, limit, entry, &exit);
-    return bvh_lanes(*entry <= exit);
+    return lane_bits(*entry <= exit);
 }
 
 // The power of two that brings x between 1 and 2; finite and above 0 for any x that is.
@@ -221,9 +208,9 @@ INLINE uint bvh_triangles(const BvhRay *ray, __global const TrianglePack *pack, 
     // comparisons.
     const float8 size = as_float8(as_int8(determinant) ^ sign), scaled = as_float8(as_int8(depth) ^ sign);
     uint lanes =
-        bvh_lanes(((lowest >= 0.0f) | (highest <= 0.0f)) & (scaled > 0.0f) & (scaled < size * limit));
+        lane_bits(((lowest >= 0.0f) | (highest <= 0.0f)) & (scaled > 0.0f) & (scaled < size * limit));
     if (lanes) {
-        lanes &= bvh_lanes(bvh_starts_before(ray, pack, determinant));
+        lanes &= lane_bits(bvh_starts_before(ray, pack, determinant));
         *distance = depth / determinant;
         weight[0] = u;
         weight[1] = v;
@@ -262,11 +249,11 @@ INLINE uint bvh_push(__global const Node *node, uint lanes, const float8 entry, 
     for (left = lanes; left; left &= left - 1) {
         const uint lane = BVH_FIRST_BIT(left);
         const float distance = distances[lane];
-        const uint farther = bvh_lanes(entry > distance) & lanes;
-        const uint equal = bvh_lanes(entry == distance) & lanes & ((1u << lane) - 1);
-        stack[*height + BVH_COUNT_BITS(farther | equal)] = bvh_entry(node->child[lane], distance);
+        const uint farther = lane_bits(entry > distance) & lanes;
+        const uint equal = lane_bits(entry == distance) & lanes & ((1u << lane) - 1);
+        stack[*height + COUNT_BITS(farther | equal)] = bvh_entry(node->child[lane], distance);
     }
-    *height += BVH_COUNT_BITS(lanes) - 1;
+    *height += COUNT_BITS(lanes) - 1;
     return (uint)stack[*height];
 }
 

@@ -29,7 +29,7 @@ INLINE bool any_lane(const int16 comparison) {
 #ifdef __AVX512DQ__
     return __builtin_ia32_cvtd2mask512(comparison) != 0;
 #else
-    return (bvh_lanes(comparison.lo) | bvh_lanes(comparison.hi)) != 0;
+    return (lane_bits(comparison.lo) | lane_bits(comparison.hi)) != 0;
 #endif
 }
 

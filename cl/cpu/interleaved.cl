@@ -151,9 +151,9 @@ INLINE void interleaved_push_children(InterleavedRay *ray, __global const Node *
     *(UnalignedInt *)references = __builtin_ia32_compresssi256_mask(children, children, met);
     if (!any)
         *(UnalignedFloat *)distances = __builtin_ia32_compresssf256_mask(sorted, sorted, met);
-    ray->height += BVH_COUNT_BITS((uint)met);
+    ray->height += COUNT_BITS((uint)met);
 #else
-    const uint met = bvh_lanes(near <= far);
+    const uint met = lane_bits(near <= far);
     const float *all = (const float *)&near;
     uint count = 0;
 #pragma unroll

@@ -235,7 +235,7 @@ INLINE bool packet_trace(Packet *packet, const Geometry *geometry, __local const
         }
 #endif
         const uint pack = reference & ~(NODE_LEAF | NODE_PACK);
-        if (BVH_COUNT_BITS(lanes) < PACKET_MANY)
+        if (COUNT_BITS(lanes) < PACKET_MANY)
             packet_test_pack_by_ray(packet, &place, pack, lanes);
         else
             packet_test_pack(packet, &place, pack);

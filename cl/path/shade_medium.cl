@@ -146,8 +146,12 @@ INLINE void shade_medium_path(const Params *params, const Shading *shading, cons
     int possible = (covered | smooth | (next.pdf > 0.0f)) & (reflected ? leaving > 0.0f : leaving < 0.0f);
 
     // Passages through smooth bodies and reflections inside them have a limit of their own; a covered
-    // boundary counts as neither.
+    // boundary counts as neither. A wall has no inside.
+#if HAS_TRAIT(THIN_WALLED)
+    int passage = smooth & !(reflected & (outside | thin));
+#else
     int passage = smooth & !(reflected & outside);
+#endif
     uint bounces = p.bounces + ((!covered) & (!passage));
     uint passages = p.passages + ((!covered) & passage);
     Vec3 carried = mul(throughput, next.weight);

@@ -1,3 +1,4 @@
+#include "base/lanes8.cl"
 #include "base/sampling.cl"
 
 // The light tree (incpt/tables/light_tree.py): from the root down, a child of each node is chosen by what its
@@ -92,24 +93,6 @@ typedef struct {
     float chance; // of coming here
 } LightWalk;
 
-// The bits of a comparison, see bvh_lanes.
-INLINE uint light_lanes(const int8 comparison) {
-#if defined(__AVX__) && defined(__clang__) && !defined(PORTABLE_LANES)
-    return (uint)__builtin_ia32_movmskps256(as_float8(comparison));
-#else
-    const int8 bit = comparison & (int8)(1, 2, 4, 8, 16, 32, 64, 128);
-    const int4 four = bit.lo | bit.hi;
-    const int2 two = four.lo | four.hi;
-    return (uint)(two.x | two.y);
-#endif
-}
-
-#ifdef __clang__
-#define LIGHT_COUNT_BITS(x) ((uint)__builtin_popcount(x))
-#else
-#define LIGHT_COUNT_BITS(x) popcount(x)
-#endif
-
 // One node further.
 INLINE void light_step(__global const LightNode *nodes, const Receiver *receiver, LightWalk *walk) {
     __global const LightNode *node = nodes + walk->node;
@@ -117,7 +100,7 @@ INLINE void light_step(__global const LightNode *nodes, const Receiver *receiver
     const float *each = (const float *)&importance, *ends = (const float *)&sums;
     const float total = ends[BVH_WIDTH - 1u], target = walk->choice * total;
     // Behind the last child, where rounding may lead, sums go on as they are.
-    const uint behind = LIGHT_COUNT_BITS(light_lanes(sums <= target));
+    const uint behind = COUNT_BITS(lane_bits(sums <= target));
     const uint chosen = MIN(behind, node->last);
     const float size = each[chosen];
     const float left = (target - (ends[chosen] - size)) / size;

@@ -12,7 +12,7 @@ import pytest
 from support.kernels import device
 from support.law import assert_edits_converge
 from support.pairs import check, traced_pairs
-from support.renders import assert_same_mean, render, repeat
+from support.renders import assert_same_mean, pixels, render, repeat
 from support.small_scenes import mixed_scene, small_settings
 
 from incpt.device.device import Device
@@ -202,14 +202,6 @@ def leaves(**settings: Any) -> Scene:
             "leaf", shape("plane"), "curtain", scene.object("glass ball").position, (30, 20, 0), (0.3, 1, 0.3)
         ),
     )
-
-
-def pixels(scene: Scene, spp: int, in_blocks: bool = True) -> npt.NDArray[np.float32]:
-    session = Session(scene, device=device())
-    if not in_blocks:
-        session._tracer = Wavefront(session.device)
-    session.render(spp)
-    return session.image()
 
 
 def test_blocks_and_wavefront_agree() -> None:

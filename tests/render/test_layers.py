@@ -7,18 +7,16 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from support.kernels import device
 from support.law import assert_edits_converge
 from support.pairs import check, traced_pairs
-from support.renders import assert_same_mean, render, repeat
+from support.renders import assert_same_mean, pixels, render, repeat
 from support.small_scenes import mixed_scene, small_settings
 
 from incpt.device.device import Device
 from incpt.render.blocks import traces_in_blocks
 from incpt.render.session import Session
-from incpt.render.wavefront import Wavefront
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
 from incpt.scene.light import Light
@@ -77,14 +75,6 @@ def of_all_kernels(scene: Scene) -> Scene:
     takes away."""
     spare = {f"spare {name}": material for name, material in room().materials.items()}
     return replace(scene, materials={**scene.materials, **spare})
-
-
-def pixels(scene: Scene, spp: int, in_blocks: bool, **settings: Any) -> npt.NDArray[np.float32]:
-    session = Session(scene, device=device(), settings=replace(scene.settings, **settings))
-    if not in_blocks:
-        session._tracer = Wavefront(session.device)
-    session.render(spp)
-    return session.image()
 
 
 def test_blocks_and_wavefront_agree() -> None:

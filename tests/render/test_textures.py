@@ -13,7 +13,7 @@ from support.kernels import device
 from support.law import assert_edits_converge
 from support.pairs import check, traced_pairs
 from support.parameters import TEXTURES
-from support.renders import assert_same_mean, render, repeat
+from support.renders import assert_same_mean, pixels, render, repeat
 from support.small_scenes import mixed_scene, small_settings
 
 from incpt.core.affine import Vector
@@ -22,7 +22,6 @@ from incpt.device.device import Device
 from incpt.picture.color import linear_from_srgb
 from incpt.render.blocks import traces_in_blocks
 from incpt.render.session import Session
-from incpt.render.wavefront import Wavefront
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
 from incpt.scene.material import Material, texture_name
@@ -78,14 +77,6 @@ def things(material: Material, with_every_slot: bool = True, **settings: Any) ->
     return Scene(
         Camera((0, 1.2, 3.2), (0, 0.4, 0)), environment, materials, objects, small_settings(**settings)
     )
-
-
-def pixels(scene: Scene, spp: int = 8, in_blocks: bool = True) -> npt.NDArray[np.float32]:
-    session = Session(scene, device=device())
-    if not in_blocks:
-        session._tracer = Wavefront(session.device)
-    session.render(spp)
-    return session.image()
 
 
 ALIKE: dict[str, tuple[Material, Material]] = {

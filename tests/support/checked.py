@@ -59,12 +59,12 @@ uint plain_clear(uint x) {
 _SPELLED_OUT = (
     (r"INLINE uint reverse_bits\(uint x\) \{.*?\n\}", ""),
     (r"#define REVERSE_BITS\(x\) \S+", "#define REVERSE_BITS(x) plain_reverse(x)"),
-    (r"#define (BVH_COUNT_BITS|BVH_FIRST_BIT)\(x\).*?\n", ""),
+    (r"#define (COUNT_BITS|BVH_FIRST_BIT)\(x\).*?\n", ""),
     (r"(\w+) &= \1 - 1", r"\1 = plain_clear(\1)"),
     (r"__builtin_(sqrt|fabs|floor)f\(", r"\1("),
     (r"__builtin_prefetch\(", "(void)("),
 )
-_DEFINED = "#define BVH_COUNT_BITS(x) plain_count(x)\n#define BVH_FIRST_BIT(x) plain_first(x)\n"
+_DEFINED = "#define COUNT_BITS(x) plain_count(x)\n#define BVH_FIRST_BIT(x) plain_first(x)\n"
 
 
 class CheckedDevice(Device):

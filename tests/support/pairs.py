@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
+import pytest
 
 from incpt.core import layout
 from incpt.device.device import Device
@@ -16,7 +17,9 @@ from incpt.render.session import Session
 from incpt.render.wavefront import Wavefront
 from incpt.scene.model import Scene
 from incpt.tables.change_tables import ChangeTables, change_tables
+from incpt.tables.geometry_pool import GeometryPool
 from incpt.tables.scene_tables import paired_tables
+from support.renders import assert_same_mean, repeat
 
 Floats = npt.NDArray[np.float32]
 
@@ -135,3 +138,15 @@ def check(pairs: TracedPairs, at_most: float = 1.0, differs: bool = True) -> Non
     np.testing.assert_array_equal(bits(pairs.partner_radiance), bits(pairs.old[:, listed]))
     assert pairs.differ.any() == differs
     assert pairs.touched.mean() <= at_most
+
+
+def assert_choice_changes_no_mean(device: Device, old: Scene, new: Scene) -> None:
+    """Choosing among the lights of both scenes brings, in either, what choosing among its own does."""
+    pool = GeometryPool.of(device)
+    for chosen, scene in enumerate((old, new)):
+        plain = repeat(scene, 128, max_bounces=2)
+        tables = paired_tables(pool, old, new)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("incpt.render.session.tables_of", lambda *_, both=tables, i=chosen: both[i])
+            paired = repeat(scene, 128, max_bounces=2)
+        assert_same_mean(plain, paired, relative=0.02)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy.typing as npt
 from incpt.core.settings import RenderSettings
 from incpt.device.device import Device
 from incpt.render.session import Session, StepReport
+from incpt.render.wavefront import Wavefront
 from incpt.scene.model import Scene
 from support.kernels import device
 
@@ -29,6 +31,16 @@ def render(
     session.render(spp, check)
     assert (session.spp() == spp).all()
     return session.image().astype(np.float64)
+
+
+def pixels(scene: Scene, spp: int = 8, in_blocks: bool = True, **settings: Any) -> npt.NDArray[np.float32]:
+    """(H, W, 3) with `spp` samples a pixel at least, by blocks where the device traces in them, or by a
+    wavefront; of the scene's own settings, with `settings` in their place."""
+    session = Session(scene, device=device(), settings=replace(scene.settings, **settings))
+    if not in_blocks:
+        session._tracer = Wavefront(session.device)
+    session.render(spp)
+    return session.image()
 
 
 def repeat(scene: Scene, spp: int, count: int = 8, **arguments: Any) -> npt.NDArray[np.float64]:

@@ -11,8 +11,8 @@ from hypothesis import HealthCheck, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from support.law import LARGE_STEPS
-from support.pairs import check, traced_pairs
-from support.renders import assert_same_mean, repeat
+from support.pairs import assert_choice_changes_no_mean, check, traced_pairs
+from support.renders import repeat
 from support.small_scenes import mixed_scene
 
 from incpt.benchmarks.kit.scenes import cornell
@@ -25,8 +25,6 @@ from incpt.scene.change import diff
 from incpt.scene.edits import unique_name
 from incpt.scene.light import Light
 from incpt.scene.model import Scene
-from incpt.tables.geometry_pool import GeometryPool
-from incpt.tables.scene_tables import paired_tables
 
 SMALL = RenderSettings(size=(44, 28), tile_size=8, max_bounces=3)
 DOWN = (-90, 0, 0)
@@ -153,21 +151,10 @@ def test_far_from_the_origin(in_blocks: bool, device: Device) -> None:
 @pytest.mark.parametrize(
     "name", ["dim a ball", "add", "lamp of triangles goes", "room: all go", "alone: first triangles"]
 )
-def test_lights_of_two_scenes_bring_what_those_of_each_bring(
-    name: str, device: Device, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Choosing among the lights of both scenes changes no mean, in either of them."""
+def test_lights_of_two_scenes_bring_what_those_of_each_bring(name: str, device: Device) -> None:
     edit = next(one for one in EDITS if one.name == name)
     old = edit.scene()
-    new = edit.apply(old)
-    pool = GeometryPool.of(device)
-    for chosen, scene in enumerate((old, new)):
-        plain = repeat(scene, 128, max_bounces=2)
-        tables = paired_tables(pool, old, new)
-        with monkeypatch.context() as patch:
-            patch.setattr("incpt.render.session.tables_of", lambda *_, both=tables, i=chosen: both[i])
-            paired = repeat(scene, 128, max_bounces=2)
-        assert_same_mean(plain, paired, relative=0.02)
+    assert_choice_changes_no_mean(device, old, edit.apply(old))
 
 
 @pytest.mark.slow
