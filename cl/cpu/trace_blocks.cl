@@ -194,6 +194,20 @@ INLINE void trace_rays(const Block *block, BlockRay *ray) {
     classify_hits(block, ray);
 }
 
+#ifdef AOVS
+// Notes which of the paths have met something: what it is that they met will soon be forgotten.
+STAGE void write_alpha(const Block *block, const BlockRay *ray) {
+    const uint size = block->size, count = ray->count;
+    __local const uint *keys = UINT_PLANES(block->memory, KEYS);
+    __global float *alpha = block->path_buffer + SAMPLE_ALPHA * block->params->buffer_stride + block->first;
+    for (uint i = 0; i < size; i++)
+        alpha[i] = 0.0f;
+    LANES
+    for (int i = 0; i < (int)count; i++)
+        alpha[load_result(&block->traced, i)] = keys[i] != KEY_MISS ? 1.0f : 0.0f;
+}
+#endif
+
 #ifdef CHANGES
 // Notes which paths have met something that changed, now that their rays are traced.
 STAGE void touch_rays(const Block *block, const BlockRay *ray) {
@@ -307,12 +321,12 @@ STAGE void setup_surfaces(const Block *block, BlockRay *ray) {
 }
 
 #ifdef AOVS
-// Fills the auxiliary planes of the path buffer; those that have hit something stand in front.
+// Fills the other auxiliary planes of the path buffer; those that have hit something stand in front.
 STAGE void write_aovs(const Block *block, const BlockRay *ray) {
     const uint first = block->first, size = block->size, count = ray->count;
     const uint stride = block->params->buffer_stride;
     __global float *path_buffer = block->path_buffer;
-    for (uint p = SAMPLE_ALBEDO_R; p < SAMPLE_PLANES; p++)
+    for (uint p = SAMPLE_ALBEDO_R; p < SAMPLE_ALPHA; p++)
         for (uint i = 0; i < size; i++)
             path_buffer[p * stride + first + i] = 0.0f;
     LANES

@@ -1,6 +1,7 @@
 #include "path/surface_material.cl"
 
-// Auxiliary images from the samples of the picture: base colour and shading normal of the first surface.
+// Auxiliary images from the samples of the picture: base colour and shading normal of the first surface, and
+// whether there is one, or a light.
 
 // Writes these for a path at `place` of the planes of the path buffer; 0 where its ray left the scene.
 INLINE void write_aovs_path(const Shading *shading, const State *state, uint path,
@@ -20,6 +21,9 @@ INLINE void write_aovs_path(const Shading *shading, const State *state, uint pat
     path_buffer[SAMPLE_NORMAL_X * stride + place] = normal.x;
     path_buffer[SAMPLE_NORMAL_Y * stride + place] = normal.y;
     path_buffer[SAMPLE_NORMAL_Z * stride + place] = normal.z;
+#ifndef BLOCKS
+    path_buffer[SAMPLE_ALPHA * stride + place] = surface.distance < INFINITY ? 1.0f : 0.0f;
+#endif
 }
 
 #ifndef BLOCKS

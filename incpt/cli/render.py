@@ -47,6 +47,13 @@ def render(
             "centres) to the .exr.",
         ),
     ] = False,
+    transparent: Annotated[
+        bool,
+        typer.Option(
+            "--transparent",
+            help="Leave out the environment behind everything, and give the picture an alpha.",
+        ),
+    ] = False,
     device: DeviceOption = None,
 ) -> None:
     """Render a scene to a picture. Ctrl-C keeps what is done."""
@@ -61,8 +68,7 @@ def render(
     if camera is not None:
         scene = scene.with_active_camera(camera)
     settings = settings_from(scene, size=size, seed=seed, strategy=strategy, max_bounces=max_bounces)
-    if aovs:
-        settings = replace(settings, aovs=True)
+    settings = replace(settings, aovs=settings.aovs or aovs, transparent=settings.transparent or transparent)
     session = Session(scene, settings=settings, device=device)
     pixels = padded_pixels(settings)
     nonfinite = paths = cut_off = 0

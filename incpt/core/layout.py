@@ -345,8 +345,9 @@ class SamplePlane(IntEnum):
     """Planes of the path buffer: what each path of a step brings, in the order of the passes of a film.
 
     The planes from ALBEDO_R on are there where the settings ask for auxiliary images. They hold base colour
-    and shading normal (world space) of the first surface, and 0 where the camera ray left the scene. Passes
-    that a strategy asks for have their planes behind those that are there.
+    and shading normal (world space) of the first surface, and in ALPHA 1 where there is one or a light; all
+    are 0 where the camera ray left the scene. Passes that a strategy asks for have their planes behind those
+    that are there.
     """
 
     RADIANCE_R = 0
@@ -358,6 +359,7 @@ class SamplePlane(IntEnum):
     NORMAL_X = 6
     NORMAL_Y = 7
     NORMAL_Z = 8
+    ALPHA = 9
 
 
 PATCH_WIDTH = 256
@@ -900,7 +902,10 @@ PARAMS = _packed(
         ("sun_probability", np.float32),
         ("listed", np.uint32),  # 1: paths take their places in the slots from a list
         ("last_ray", np.uint32),  # number of the ray with which all paths end, see stages.py
-        ("sees_sky", np.uint32),  # 1: light comes from far away
+        (
+            "first_sky_ray",
+            np.uint32,
+        ),  # of a path, to which light comes from far away; MOST_RAYS: there is none
         ("pixel_center", np.uint32),  # 1: camera rays go through pixel centres (first hits)
     ]
 )

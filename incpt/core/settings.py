@@ -48,6 +48,10 @@ class RenderSettings:
     seed                  chooses the random numbers.
     aovs                  whether base colour and shading normal of what the samples meet first are passes of
                           the film, beside radiance: see `Session.pass_image`.
+    transparent           whether light from far away, the environment and suns, stays out of sight of the
+                          camera, so that the picture can be laid over another one: see `Session.image`. It
+                          lights the scene all the same, and is seen by reflection and through glass that
+                          bends rays.
     """
 
     size: tuple[int, int] = (960, 540)
@@ -66,6 +70,7 @@ class RenderSettings:
     slots_per_step: int | None = None
     seed: int = 0
     aovs: bool = False
+    transparent: bool = False
 
     def __post_init__(self) -> None:
         width, height = _whole_pair(self.size)
@@ -82,9 +87,15 @@ class RenderSettings:
         object.__setattr__(self, "clamp_indirect", _radiance("clamp_indirect", self.clamp_indirect))
         require_bool("multiple_scattering", self.multiple_scattering)
         require_bool("aovs", self.aovs)
+        require_bool("transparent", self.transparent)
         require_bool("nor_adapts", self.nor_adapts)
         one_of("strategy", self.strategy, STRATEGIES)
         one_of("point_of_change", self.point_of_change, POINTS_OF_CHANGE)
+
+    @property
+    def has_aovs(self) -> bool:
+        """Whether auxiliary images are passes of the film: coverage is one of them."""
+        return self.aovs or self.transparent
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
@@ -135,6 +146,7 @@ CUT_OFF_WORTH_TELLING = 1e-2
 
 PICTURE_SETTINGS = (
     *("max_bounces", "transmission_bounces", "roulette_depth", "multiple_scattering", "clamp_indirect"),
+    "transparent",
     "seed",
 )
 """Settings that change what a sample is worth, so that what was accumulated cannot be kept."""

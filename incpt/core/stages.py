@@ -39,7 +39,7 @@ class When(Flag):
     CHANGED_LIGHTS = auto()
     """Some of the lights differ between the two scenes."""
     SKY = auto()
-    """Light comes from far away."""
+    """The ray sees light from far away, if it meets nothing."""
     CAMERA_RAY = auto()
     """The ray comes from the camera."""
     GOES_ON = auto()
@@ -52,8 +52,7 @@ class When(Flag):
 class Stage:
     """A stage of a ray.
 
-    kernel  the kernel of cl/path/ that does it for a list of paths; None: that of the stage before has done
-            it.
+    kernel  the kernel of cl/path/ that does it for a list of paths; None: that of another stage does it.
     loop    the function of cl/cpu/trace_blocks.cl that does it for a block; None: that of another stage does
             it for these paths too.
     paths   which paths go through it.
@@ -73,6 +72,8 @@ _TOUCHES_LIGHTS = When.CHANGES | When.LAMPS | When.CHANGED_LIGHTS
 
 STAGES = (
     Stage("intersect", "trace_rays", PathList.LIVE, sorts=(PathList.SURFACE, PathList.MISS, PathList.MEDIUM)),
+    # The kernel `write_aovs` does it; a block no longer knows then which paths have met a light.
+    Stage(None, "write_alpha", PathList.LIVE, When.AOVS | When.CAMERA_RAY),
     Stage("touch_rays", "touch_rays", PathList.LIVE, When.CHANGES),
     # The kernel that finds the hit of a ray ends the path where it is one on a light.
     Stage(None, "shade_lights", PathList.LIVE, When.SHAPED_LIGHTS),
@@ -112,7 +113,7 @@ _HOLDS = {
 
 _IN_C = {
     When.CHANGED_LIGHTS: "(block)->changes->change.has_lights",
-    When.SKY: "(block)->params->sees_sky",
+    When.SKY: "(ray)->number >= (block)->params->first_sky_ray",
     When.CAMERA_RAY: "(ray)->number == 0",
     When.GOES_ON: "(ray)->number != (block)->params->last_ray",
     When.ENDS: "(ray)->number == (block)->params->last_ray",

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -132,13 +133,20 @@ class Device:
         same types in every launch of a kernel."""
         group = work_group or self.tuning.work_group
         if kernel not in self._typed:
-            # pyopencl then packs arguments without looking at each: microseconds instead of some ten of them.
-            kernel.set_scalar_arg_dtypes([arg.dtype if isinstance(arg, _SCALARS) else None for arg in args])
-            self._typed.add(kernel)
+            self._type(kernel, args)
         try:
             return kernel(self.queue, (-(-size // group) * group,), (group,), *args)
         except cl.Error as error:
             raise DeviceError(_explain(error, f"kernel {kernel.function_name}")) from error
+
+    def _type(self, kernel: cl.Kernel, args: Sequence[Any]) -> None:
+        # pyopencl then packs arguments without looking at each: microseconds instead of some ten of them. It
+        # keeps how to pack them in a cache on disk, and warns where another version of incpt has left there
+        # the same struct with other names of fields; it then goes on as if there was nothing.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            kernel.set_scalar_arg_dtypes([arg.dtype if isinstance(arg, _SCALARS) else None for arg in args])
+        self._typed.add(kernel)
 
     def empty(self, nbytes: int) -> cl.Buffer:
         """An uninitialised buffer, at least 4 bytes. Raises DeviceError where memory runs out."""

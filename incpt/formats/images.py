@@ -26,7 +26,7 @@ from incpt.core.files import check_readable, write_atomically, write_bytes
 from incpt.core.layout import ENVIRONMENT_MAX_SIZE
 from incpt.formats import registry
 from incpt.formats.registry import OPENEXR, FileKind
-from incpt.picture.tone_mapping import tone_map
+from incpt.picture.tone_mapping import tone_map_covered
 from incpt.scene.image import Image
 
 Float32Image = npt.NDArray[np.float32]
@@ -40,14 +40,15 @@ _images: weakref.WeakValueDictionary[tuple[str, int, int], Image] = weakref.Weak
 def write_png(
     path: str | os.PathLike[str], image: npt.ArrayLike, exposure: float = 0.0, curve: str = "agx"
 ) -> None:
-    """Writes a (H, W, 3) picture of linear radiance as 8-bit sRGB, atomically; see `tone_map`.
+    """Writes a (H, W, 3) picture of linear radiance as 8-bit sRGB, atomically; see `tone_map`. One with the
+    shape (H, W, 4) has coverage in its last channel, by which radiance is multiplied already.
 
     Raises OutputError where the file cannot be written, InputError for an array that is no picture.
     """
     path = path_of("path", path)
-    pixels = tone_map(image, exposure, curve)
+    pixels = tone_map_covered(image, exposure, curve)
     if pixels.ndim != 3 or pixels.size == 0:
-        raise InputError(f"image: has shape {pixels.shape}; a picture has shape (height, width, 3)")
+        raise InputError(f"image: has shape {pixels.shape}; a picture has shape (height, width, 3 or 4)")
     import PIL.Image
 
     encoded = io.BytesIO()

@@ -61,6 +61,21 @@ def tone_map(linear: npt.ArrayLike, exposure: float = 0.0, curve: str = "agx") -
     return result
 
 
+def tone_map_covered(
+    image: npt.ArrayLike, exposure: float = 0.0, curve: str = "agx"
+) -> npt.NDArray[np.uint8]:
+    """`tone_map` of a picture (..., 3), or of one (..., 4) with the share that each pixel is covered, 0 to 1,
+    by which its radiance is multiplied: straight alpha, 0 to 255, is the last channel of what is returned.
+    Raises InputError."""
+    values = numbers("image", image, np.float64)
+    if values.shape[-1:] != (4,):
+        return tone_map(values, exposure, curve)
+    radiance, alpha = values[..., :3], values[..., 3:]
+    own = np.divide(radiance, alpha, out=np.zeros_like(radiance), where=alpha > 0)
+    opacity = np.rint(np.clip(alpha, 0.0, 1.0) * 255.0).astype(np.uint8)
+    return np.concatenate([tone_map(own, exposure, curve), opacity], axis=-1)
+
+
 def display_values(
     linear: npt.ArrayLike, exposure: float = 0.0, curve: str = "agx"
 ) -> npt.NDArray[np.float64]:

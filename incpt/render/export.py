@@ -16,24 +16,28 @@ def write_picture(
     path: Path, session: Session, with_aovs: bool = False, exposure: float = 0.0, curve: str = "agx"
 ) -> None:
     """Write the picture as it is now: .exr holds linear radiance and, `with_aovs`, auxiliary images as
-    layers; .png is tone-mapped (see `tone_mapping.tone_map`). Raises InputError for another suffix, and
-    OutputError where the file cannot be written.
+    layers; .png is tone-mapped (see `tone_mapping.tone_map`). Under the setting `transparent` both have the
+    picture's alpha: as programs expect, radiance is multiplied by it in .exr, and colours in .png are not.
+    Raises InputError for another suffix, and OutputError where the file cannot be written.
 
     Distance and object ids are those of rays through pixel centres. Base colours and normals are means over
-    the samples of the picture where the session has the setting `aovs`, else of the same rays.
+    the samples of the picture where the session has the setting `aovs` or `transparent`, else of those rays
+    too.
     """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise InputError(f"{path}: ends in no known format; use .exr or .png")
+    is_transparent = session.settings.transparent
+    image = session.image(alpha=is_transparent)
     if suffix == ".png":
-        images.write_png(path, session.image(), exposure, curve)
+        images.write_png(path, image, exposure, curve)
         return
-    layers: dict[str, Any] = {"RGB": session.image()}
+    layers: dict[str, Any] = {"RGBA" if is_transparent else "RGB": image}
     if with_aovs:
         hits = session.first_hits()
         # Object ids are unsigned in OpenEXR; the largest one stands for "none".
         layers |= {"depth.Z": hits.depth, "object_id": hits.object_id.view("uint32")}
-        has_passes = session.settings.aovs
+        has_passes = session.settings.has_aovs
         layers["albedo.RGB"] = session.pass_image("albedo") if has_passes else hits.albedo
         layers["normal.XYZ"] = session.pass_image("normal") if has_passes else hits.normal
     images.write_exr(path, layers)

@@ -81,7 +81,10 @@ ALBEDO = FilmPass("albedo", 3, is_aov=True)
 NORMAL = FilmPass("normal", 3, is_aov=True)
 """Shading normal of the first surface in world space, 0 where there is none. It points to the outside of the
 face, from whichever side the ray comes. Means are shorter than 1 where the samples of a pixel differ."""
-AOVS = (ALBEDO, NORMAL)
+ALPHA = FilmPass("alpha", 1, is_aov=True)
+"""The share of a pixel that surfaces and lights cover, as the camera sees them: of its samples, those that
+met one."""
+AOVS = (ALBEDO, NORMAL, ALPHA)
 """Auxiliary images, as denoisers expect them: means over the samples of the picture. They lie in the path
 buffer as layout.SamplePlane says.
 
@@ -113,8 +116,11 @@ class Film:
         height: int,
         passes: tuple[FilmPass, ...] = (RADIANCE,),
         planes: tuple[FilmPlanes, ...] = (),
+        is_transparent: bool = False,
     ) -> None:
         self.device, self.width, self.height, self.passes = device, width, height, passes
+        self.is_transparent = is_transparent
+        """Whether the picture tells what share of each pixel is covered, for which it has the pass ALPHA."""
         self.revision = 0
         """Another number whenever sums changed, so that what was made of them need not be made twice."""
         self._counters = device.empty(4 * len(Counter))
@@ -213,11 +219,26 @@ class Film:
 
     def image(self, name: str = RADIANCE.name) -> Float32Array:
         """(height, width, channels + 1) the picture of a pass, for radiance its mean, linear; the last
-        channel is 1, or 0 where there is no sample yet."""
+        channel is 1, or 0 where there is no sample yet. That of radiance is as `with_coverage` says."""
         layer, pixels = self._layers[name], self.width * self.height
         layer.resolve(pixels, pixels)
         image = np.empty((self.height, self.width, layer.film_pass.channels + 1), np.float32)
-        return self.device.read(layer.image, image)
+        image = self.device.read(layer.image, image)
+        return self.with_coverage(image) if name == RADIANCE.name else image
+
+    def with_coverage(self, image: Float32Array) -> Float32Array:
+        """A picture (height, width, 4) of radiance; a transparent film puts into its last channel what share
+        of each pixel is covered."""
+        if self.is_transparent:
+            image[..., 3] = self.image(ALPHA.name)[..., 0]
+        return image
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether every pixel has a sample."""
+        pixels = self.width * self.height
+        counts = self.device.read(self.radiance_sums(), np.empty(pixels, np.float32), 3 * 4 * pixels)
+        return bool(counts.min() > 0)
 
     def sums(self) -> dict[str, Float32Array]:
         """(channels + 1, height, width) of each pass: the sums of its channels, and the number of samples;

@@ -29,6 +29,7 @@ def path_params(
     for name in ("tile_size", "seed", "max_bounces", "transmission_bounces", "roulette_depth",
                  "multiple_scattering", "clamp_indirect"):  # fmt: skip
         params[name] = getattr(settings, name)
+    params["first_sky_ray"] = int(settings.transparent)
     return params
 
 
@@ -67,7 +68,8 @@ def launch_params(params: npt.NDArray[np.void], tables: SceneTables) -> npt.NDAr
     params["last_ray"] = stages.last_ray(int(params["max_bounces"]), tables.has_media)
     params["camera_media"] = tables.camera_media
     shaped = tables.lights.shaped
-    params["sees_sky"] = any(tables.environment_radiance) or shaped.sun_count > 0
+    if not any(tables.environment_radiance) and shaped.sun_count == 0:
+        params["first_sky_ray"] = layout.MOST_RAYS
     params["light_count"] = tables.light_count
     params["shaped_count"], params["sun_count"] = shaped.count, shaped.sun_count
     params["shaped_probability"] = shaped.probability

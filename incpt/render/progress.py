@@ -161,7 +161,7 @@ class Progress:
     def _stale_after(self, scene: Scene, changed: tuple[Placed, ...]) -> BoolArray | None:
         """`stale` after an edit that affects the objects `changed`: auxiliary images show something else
         where these are seen, and nowhere else."""
-        if not self.settings.aovs:
+        if not self.settings.has_aovs:
             return None
         stale = np.zeros(self.grid.count, np.bool_) if self.stale is None else self.stale.copy()
         stale[seen_tiles(self.grid, scene.camera, changed)] = True

@@ -284,10 +284,11 @@ class Session:
 
     def image(self, alpha: bool = False, first_sight: bool = False) -> npt.NDArray[np.float32]:
         """(H, W, 3) mean radiance, linear; row 0 is on top. What is not rendered anew yet shows the old
-        picture, at first black. With `alpha` (H, W, 4): 0 where there was never a picture of this size.
-        With `first_sight` what an edit moved is drawn at its new place, where no sample of it is there yet
-        and the strategy compares scenes: a guess for whoever looks, from first hits and the old picture's
-        light."""
+        picture, at first black. With `alpha` (H, W, 4): 0 where there was never a picture of this size, and
+        under the setting `transparent` the share of each pixel that is covered, by which its radiance is
+        multiplied already. With `first_sight` what an edit moved is drawn at its new place, where no sample
+        of it is there yet and the strategy compares scenes: a guess for whoever looks, from first hits and
+        the old picture's light."""
         require_bool("alpha", alpha)
         require_bool("first_sight", first_sight)
         film, comparison, progress = self._state.film, self._state.comparison, self.progress
@@ -307,12 +308,13 @@ class Session:
     def pass_image(self, name: str) -> npt.NDArray[np.float32]:
         """(H, W, channels) the picture of a pass of the film: "radiance" is `image`. With the setting `aovs`,
         "albedo" and "normal" (H, W, 3) are the mean base colour and the mean shading normal (world space) of
-        what the samples of the picture met first, 0 for those that met nothing. Distance and object have no
+        what the samples of the picture met first, 0 for those that met nothing; "alpha" (H, W, 1) is the
+        share of those that met a surface or a light. Distance and object have no
         mean: see `first_hits`. Raises InputError for a pass that there is not."""
         require("name", name, str, "the name of a pass")
         passes = {one.name: one for one in self._state.film.passes}
         if name not in passes:
-            hint = "" if self.settings.aovs else "; the setting aovs adds albedo and normal"
+            hint = "" if self.settings.has_aovs else "; the setting aovs adds albedo, normal and alpha"
             raise InputError(f"pass {name!r}: is not in the film; choose one of {', '.join(passes)}{hint}")
         if name == RADIANCE.name:
             return self.image()
@@ -510,7 +512,7 @@ class Session:
         params["buffer_stride"] = path_buffer.stride
         paths, filled = len(slots) * settings.tile_size**2, self.device.upload(slots)
         floats, counters = path_buffer.floats, self._state.film.counters
-        return Batch(self._tables, params, filled, paths, floats, counters, settings.aovs)
+        return Batch(self._tables, params, filled, paths, floats, counters, settings.has_aovs)
 
 
 def _point(pixel: tuple[float, float] | None) -> tuple[float, float] | None:
@@ -525,4 +527,4 @@ def _rows(rows: tuple[int, int], height: int) -> tuple[int, int]:
 
 
 def _new_film(device: Device, settings: RenderSettings) -> Film:
-    return Film(device, *settings.size, passes_of(settings))
+    return Film(device, *settings.size, passes_of(settings), is_transparent=settings.transparent)

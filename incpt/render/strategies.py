@@ -134,7 +134,7 @@ def strategy_of(settings: RenderSettings) -> Strategy:
 def passes_of(settings: RenderSettings) -> tuple[FilmPass, ...]:
     """What the film of a session with these settings holds, in the order of the planes of the path buffer:
     radiance, auxiliary images where they are asked for, and what the strategy needs."""
-    return (RADIANCE, *(AOVS if settings.aovs else ()), *strategy_of(settings).passes)
+    return (RADIANCE, *(AOVS if settings.has_aovs else ()), *strategy_of(settings).passes)
 
 
 def point_of_change(

@@ -193,8 +193,8 @@ class Wavefront:
 
     def _trace_ray(self, chunk: _Chunk, ray: int, bound: int) -> None:
         """Ray number `ray` of every live path, which are `bound` at most."""
-        last, sees_sky = int(chunk.params["last_ray"]), bool(chunk.params["sees_sky"])
-        holds = holding(ray, last, sees_sky, chunk.has_other_lights)
+        last, first_sky_ray = int(chunk.params["last_ray"]), int(chunk.params["first_sky_ray"])
+        holds = holding(ray, last, ray >= first_sky_ray, chunk.has_other_lights)
         for one in chunk.launches:
             stage = one.stage
             if stage.when in holds:

@@ -65,6 +65,7 @@ class PictureReader:
             strategy=progress.settings.strategy,
             error_left=progress.error_left,
             findings=progress.findings,
+            transparent=progress.settings.transparent,
         )
 
     def _compare(self, image: Float32Image, reference: Float32Image | None, must_be_new: bool) -> None:

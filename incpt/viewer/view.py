@@ -54,7 +54,8 @@ class Picture:
     """One side.
 
     image       (h, w, 4) float32 mean radiance, linear, row 0 on top; alpha 0 where there is no sample of
-                this size yet. The same array again in the next Frame where nothing new was read.
+                this size yet, unless it is `transparent`: see `Session.image`. The same array again in the
+                next Frame where nothing new was read.
     queue       (n,) int32 tiles in order; `queue_done` of them are finished.
     tile_spp    (count,) int64 samples behind each tile.
     replaced    (count,) bool: tiles finished since the last change of the scene.
@@ -62,6 +63,7 @@ class Picture:
     error       normalized RMSE against the pinned reference, or None.
     error_left  the share of the visible error of an edit that is left, as `Session.error_left` has it.
     findings    what is known of the edit, tile by tile; None: nothing yet.
+    transparent whether the picture can be seen through, as the setting says.
     """
 
     image: Float32Image
@@ -76,6 +78,7 @@ class Picture:
     strategy: str
     error_left: float | None = None
     findings: Findings | None = None
+    transparent: bool = False
 
 
 @dataclass(frozen=True, eq=False)

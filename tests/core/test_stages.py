@@ -81,7 +81,8 @@ def test_calls_in_c() -> None:
     assert stages.c_header(("TRIANGLE_LIGHTS", "AOVS")) == (
         "#define STAGES_OF_RAY(block, ray) \\\n"
         "    trace_rays(block, ray); \\\n"
-        "    if ((block)->params->sees_sky) shade_misses(block, ray); \\\n"
+        "    if ((ray)->number == 0) write_alpha(block, ray); \\\n"
+        "    if ((ray)->number >= (block)->params->first_sky_ray) shade_misses(block, ray); \\\n"
         "    setup_surfaces(block, ray); \\\n"
         "    if ((ray)->number == 0) write_aovs(block, ray); \\\n"
         "    if ((ray)->number != (block)->params->last_ray) shade_surfaces(block, ray); \\\n"

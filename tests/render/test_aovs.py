@@ -14,7 +14,7 @@ from incpt.core.errors import InputError
 from incpt.core.settings import RenderSettings
 from incpt.device.device import Device
 from incpt.formats import registry, scene_save
-from incpt.render.film import ALBEDO, AOVS, NORMAL, RADIANCE, plane_count
+from incpt.render.film import ALBEDO, ALPHA, AOVS, NORMAL, RADIANCE, plane_count
 from incpt.render.modes import Mode
 from incpt.render.session import Session
 from incpt.render.strategies import passes_of
@@ -25,7 +25,7 @@ from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
 
-NAMES = ("albedo", "normal")
+NAMES = ("albedo", "normal", "alpha")
 
 
 def session_of(device: Device, scene: Scene, in_blocks: bool = True, **settings: object) -> Session:
@@ -58,20 +58,21 @@ def edge_scene() -> Scene:
 
 def test_planes_lie_as_the_passes_of_a_film_follow_each_other() -> None:
     settings = RenderSettings(aovs=True)
-    assert passes_of(settings) == (RADIANCE, ALBEDO, NORMAL) == (RADIANCE, *AOVS)
+    assert passes_of(settings) == (RADIANCE, ALBEDO, NORMAL, ALPHA) == (RADIANCE, *AOVS)
     assert passes_of(RenderSettings()) == (RADIANCE,)
     assert plane_count(passes_of(settings)) == len(layout.SamplePlane)
     assert plane_count((RADIANCE,)) == layout.SamplePlane.ALBEDO_R
     assert plane_count((RADIANCE, ALBEDO)) == layout.SamplePlane.NORMAL_X
+    assert plane_count((RADIANCE, ALBEDO, NORMAL)) == layout.SamplePlane.ALPHA
 
 
 @pytest.mark.parametrize("in_blocks", [True, False])
 def test_an_edge_is_as_bright_as_its_share_of_the_pixel(device: Device, in_blocks: bool) -> None:
     session = rendered(device, edge_scene(), 2048, in_blocks, sample_rate=64)
     coverage = np.float32([1, 1, 1, 1, 1, 1, 0.3, 0])
-    for name, value in (("albedo", (0.8, 0.4, 0.2)), ("normal", (0, 0, 1))):
+    for name, value in (("albedo", (0.8, 0.4, 0.2)), ("normal", (0, 0, 1)), ("alpha", (1,))):
         image = session.pass_image(name)
-        assert image.shape == (4, 8, 3) and image.dtype == np.float32
+        assert image.shape == (4, 8, len(value)) and image.dtype == np.float32
         whole = coverage != np.float32(0.3)
         expected = np.broadcast_to(coverage[:, None] * np.float32(value), image.shape)
         np.testing.assert_allclose(image[:, whole], expected[:, whole], atol=1e-6)
@@ -127,7 +128,7 @@ def test_radiance_is_the_same_with_and_without(device: Device, in_blocks: bool) 
     for aovs in (False, True):
         session = rendered(device, mixed_scene(), 4, in_blocks, aovs=aovs)
         images.append(session.image())
-        assert session._state.path_buffer.planes == (9 if aovs else 3)
+        assert session._state.path_buffer.planes == (10 if aovs else 3)
     np.testing.assert_array_equal(*images)
 
 
@@ -138,7 +139,7 @@ def test_what_paths_of_the_step_before_left_is_overwritten(device: Device) -> No
         assert session.pass_image("albedo").any()
         session.edit(replace(session.scene, objects=()))
         session.render(1)
-        assert not session.pass_image("albedo").any() and not session.pass_image("normal").any()
+        assert not any(session.pass_image(name).any() for name in NAMES)
 
 
 def test_an_edit_replaces_all_passes_together(device: Device) -> None:
@@ -192,7 +193,7 @@ def test_a_pass_that_there_is_not_is_an_error_with_the_names(device: Device) -> 
     np.testing.assert_array_equal(session.pass_image("radiance"), session.image())
     with pytest.raises(InputError, match=r"pass 'albedo': .*one of radiance; the setting aovs adds albedo"):
         session.pass_image("albedo")
-    with pytest.raises(InputError, match=r"pass 'depth': .*one of radiance, albedo, normal$"):
+    with pytest.raises(InputError, match=r"pass 'depth': .*one of radiance, albedo, normal, alpha$"):
         session_of(device, mixed_scene()).pass_image("depth")
 
 

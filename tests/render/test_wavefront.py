@@ -63,9 +63,9 @@ def test_rays_end_where_the_scene_allows_no_more(device: Device) -> None:
 def test_light_from_far_away_is_looked_for_where_there_is_some(device: Device) -> None:
     params = np.zeros((), layout.PARAMS)
     scene = cornell()
-    for color, sees_sky in (((0, 0, 0), 0), ((0, 0, 0.1), 1)):
+    for color, first_sky_ray in (((0, 0, 0), layout.MOST_RAYS), ((0, 0, 0.1), 0)):
         tables = described(device, scene.with_environment(color=color))
-        assert launch_params(params, tables)["sees_sky"] == sees_sky
+        assert launch_params(params, tables)["first_sky_ray"] == first_sky_ray
 
 
 def test_long_paths_in_media_end(device: Device) -> None:

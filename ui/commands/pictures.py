@@ -35,6 +35,7 @@ def copy_picture(editor: Editor) -> None:
     """Put the picture on the clipboard as it is shown."""
     assert editor.frame is not None
     display = editor.preferences.display
-    linear = editor.frame.pictures[-1].image[..., :3]
-    clipboard.copy_picture(tone_mapping.tone_map(linear, display.exposure, display.curve))
+    picture = editor.frame.pictures[-1]
+    image = picture.image if picture.transparent else picture.image[..., :3]
+    clipboard.copy_picture(tone_mapping.tone_map_covered(image, display.exposure, display.curve))
     editor.say("the picture is on the clipboard", "done")

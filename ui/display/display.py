@@ -137,6 +137,7 @@ class Display:
         program["factor"] = 2.0**settings.exposure
         program["curve"] = shaders.CURVE_NUMBERS[settings.curve]
         program["nothing"] = self.background
+        program["transparent"] = side.picture is not None and side.picture.transparent
         program["has_underlay"] = side.underlay is not None
         program["picture"], program["underlay"] = 0, 1
         side.radiance.use(0)

@@ -41,9 +41,18 @@ uniform sampler2D picture;
 uniform sampler2D underlay;
 uniform bool has_underlay;
 uniform vec3 nothing;
+uniform bool transparent;
 uniform float factor;
 uniform int curve;
 out vec4 result;
+
+const float square = 8.0;
+
+// The pattern by which programs show that nothing is there: sRGB.
+vec3 checkerboard(vec2 pixel) {{
+    vec2 at = floor(pixel / square);
+    return vec3(mod(at.x + at.y, 2.0) < 0.5 ? 0.40 : 0.55);
+}}
 
 vec3 srgb(vec3 x) {{
     x = min(x, 1.0);
@@ -74,12 +83,16 @@ void main() {{
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec4 radiance = texelFetch(picture, pixel, 0);
     if (radiance.a == 0.0) {{
-        if (!has_underlay) {{
+        if (!has_underlay && !transparent) {{
             result = vec4(nothing, 1.0);
             return;
         }}
-        radiance = texture(underlay, gl_FragCoord.xy / vec2(textureSize(picture, 0)));
+        if (has_underlay)
+            radiance = texture(underlay, gl_FragCoord.xy / vec2(textureSize(picture, 0)));
     }}
+    float alpha = transparent ? clamp(radiance.a, 0.0, 1.0) : 1.0;
+    if (transparent && radiance.a > 0.0)
+        radiance.rgb /= radiance.a;
     // A comparison with NaN may be optimised away; its bits cannot be mistaken.
     uvec3 bits = floatBitsToUint(radiance.rgb) & 0x7fffffffu;
     if (any(greaterThan(bits, uvec3(0x7f800000u)))) {{
@@ -87,10 +100,12 @@ void main() {{
         return;
     }}
     vec3 linear = min(clamp(radiance.rgb, 0.0, 1e30) * factor, 1e30);
-    result = vec4(curve == 0 ? agx(linear) : curve == 1 ? filmic(linear) : srgb(linear), 1.0);
+    vec3 shown = curve == 0 ? agx(linear) : curve == 1 ? filmic(linear) : srgb(linear);
+    result = vec4(mix(checkerboard(gl_FragCoord.xy), shown, alpha), 1.0);
 }}
 """
-"""Fragment shader: sRGB of linear radiance at the picture's own size."""
+"""Fragment shader: sRGB of linear radiance at the picture's own size, transparent pictures over a
+checkerboard."""
 
 CURVE_NUMBERS = {"agx": 0, "filmic": 1, "srgb": 2}
 """The values of `curve` in TONE_MAP, by name of the curve."""

@@ -124,4 +124,6 @@ class PictureTextures:
 
 
 def _is_complete(picture: Picture) -> bool:
+    if picture.transparent:  # Its alpha tells what is covered.
+        return bool((picture.tile_spp > 0).all())
     return bool((picture.image[..., 3] != 0).all())

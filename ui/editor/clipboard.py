@@ -20,7 +20,8 @@ _SECONDS = 5.0
 
 
 def copy_picture(pixels: npt.NDArray[np.uint8]) -> None:
-    """Put (H, W, 3) sRGB `pixels` on the clipboard as PNG. Raises OutputError that says what is missing."""
+    """Put sRGB `pixels` (H, W, 3), or (H, W, 4) with alpha, on the clipboard as PNG. Raises OutputError that
+    says what is missing."""
     folder = Path(tempfile.mkdtemp(prefix="incpt-"))
     path = folder / "picture.png"
     try:

@@ -41,6 +41,10 @@ _CLAMP_TIP = (
     "Against fireflies: the most that a sample adds at once after its first bounce; 0: all. Biased: it makes "
     "the picture darker than it should be"
 )
+_TRANSPARENT_TIP = (
+    "The environment lights the scene, but is not seen behind it: the picture gets an alpha for what it is "
+    "laid over"
+)
 _WITHOUT_NOR = "The strategy that is chosen repeats no tiles"
 _TILE_SIZES = (8, 16, 32, 64, 128)
 """Tile sizes that are offered, in pixels."""
@@ -166,6 +170,8 @@ def draw_settings(settings: RenderSettings, refusals: Refusals) -> RenderSetting
             settings = refusals.changed(settings, nor_adapts=adapts)
     clamp = widgets.number("Clamp indirect", settings.clamp_indirect, high=1e6, speed=0.02, tip=_CLAMP_TIP)
     settings = refusals.changed(settings, clamp_indirect=clamp)
+    transparent = widgets.checkbox("Transparent", settings.transparent, _TRANSPARENT_TIP)
+    settings = refusals.changed(settings, transparent=transparent)
     width = widgets.whole_number("Width", settings.size[0], low=16, high=8192, speed=2.0, tip="Pixels")
     height = widgets.whole_number("Height", settings.size[1], low=16, high=8192, speed=2.0, tip="Pixels")
     return refusals.changed(settings, size=(width, height))

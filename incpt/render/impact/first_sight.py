@@ -62,7 +62,7 @@ class CenterHits:
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Pixels of a window (h, w) that are drawn, and their radiance (h, w, 3)."""
+    """Pixels of a window (h, w) that are drawn, and their radiance and coverage (h, w, 4)."""
 
     window: Window
     is_drawn: Mask
@@ -88,7 +88,7 @@ class FirstSight:
             return None
         image = self._kept[0].copy()
         for patch in self._patches_on(film):
-            image[rows_columns(patch.window)][patch.is_drawn, :3] = patch.radiance[patch.is_drawn]
+            image[rows_columns(patch.window)][patch.is_drawn] = patch.radiance[patch.is_drawn]
         return image
 
     def drawn_into(self, image: Float32Array, film: Film, grid: TileGrid, is_waiting: Mask) -> Float32Array:
@@ -100,7 +100,7 @@ class FirstSight:
             x, y = np.arange(left, right, dtype=np.int32), np.arange(top, bottom, dtype=np.int32)
             tile = grid.tile_at(x[None, :], y[:, None])
             chosen = patch.is_drawn & is_waiting[tile]
-            image[inside][chosen, :3] = patch.radiance[chosen]
+            image[inside][chosen] = patch.radiance[chosen]
         return image
 
     def _patches_on(self, film: Film) -> list[Patch]:
@@ -113,12 +113,13 @@ class FirstSight:
         area = sum((right - left) * (bottom - top) for left, top, right, bottom in self._windows)
         if area > LARGEST_SHARE * width * height or not self._moved:
             return []
+        if not film.is_whole:  # There is no picture to take all light from.
+            return []
         if not self._kept:
             self._kept.append(film.image())
         picture = self._kept[0]
-        if picture[..., 3].min() == 0:  # There is no whole picture to take the light from.
-            return []
-        return [patch for window in self._windows if (patch := self._patch(window, picture)).is_drawn.any()]
+        patches = [self._patch(window, picture, film.is_transparent) for window in self._windows]
+        return [patch for patch in patches if patch.is_drawn.any()]
 
     @cached_property
     def _moved(self) -> tuple[Mask, Mask]:
@@ -127,7 +128,7 @@ class FirstSight:
         old, new = self._anchor.scene.objects, self._now.scene.objects
         return _moved(old, new), _moved(new, old)
 
-    def _patch(self, window: Window, picture: Float32Array) -> Patch:
+    def _patch(self, window: Window, picture: Float32Array, is_transparent: bool) -> Patch:
         inside = rows_columns(window)
         was_moved, is_moved = self._moved
         objects = self._now.objects[inside]
@@ -144,7 +145,9 @@ class FirstSight:
             chosen = uncovered & (objects == number)
             light[chosen] = self._exposures_beside(int(number), chosen, window, picture)
         radiance = light * _reflectance(objects, self._now.colors[inside])
-        return Patch(window, shows_moved | uncovered, radiance)
+        covered = (objects >= 0) | np.bool_(not is_transparent)
+        shown = np.concatenate([radiance, covered[..., None]], axis=-1, dtype=np.float32)
+        return Patch(window, shows_moved | uncovered, shown)
 
     def _exposures_of(
         self, number: int, normals: Float32Array, picture: Float32Array, window: Window

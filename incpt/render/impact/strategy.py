@@ -118,7 +118,7 @@ class Impact(Strategy):
         """The anchor's picture with what is found of the change."""
         if comparison is None:
             return super().image(film, None)
-        return comparison.image(film)
+        return film.with_coverage(comparison.image(film))
 
     def begin(self, film: Film) -> None:
         """Forget the pairs of the scene before."""

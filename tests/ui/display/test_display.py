@@ -200,6 +200,35 @@ def test_the_preview_shows_until_its_successor_is_complete(screen: Any) -> None:
     assert_same(window.draw(rect)[4:], np.broadcast_to(background, (4, 16, 3)))
 
 
+def test_a_transparent_picture_lies_on_a_checkerboard(screen: Any) -> None:
+    rgb, alpha = noise(32, 16) * 0.5, np.zeros((16, 32))
+    alpha[:, 8:16], alpha[:, 16:] = 0.5, 1.0
+    seen = replace(picture(rgb * alpha[..., None], alpha=alpha), transparent=True)
+    window = screen(32, 16)
+    window.display.upload([seen])
+    shown = window.draw(Rect(0, 0, 32, 16))
+    assert_same(shown[:, 16:], mapped(rgb)[:, 16:])
+    board = shown[:, :8]
+    assert len(np.unique(board)) == 2 and (board[0, 0] != board[8, 0]).all()
+    # The squares alternate along a row too, so that those of the next columns are the other ones.
+    behind = board[::-1].astype(int)
+    assert_same(shown[:, 8:16], np.rint((mapped(rgb)[:, 8:16].astype(int) + behind) / 2).astype(np.uint8), 2)
+
+
+def test_the_preview_of_a_transparent_picture_shows_until_all_tiles_are_there(screen: Any) -> None:
+    red = picture(np.broadcast_to((0.8, 0.1, 0.1), (4, 8, 3)))
+    whole = replace(red, transparent=True, tile_spp=red.tile_spp + 1)
+    alpha = np.zeros((8, 16))
+    waiting = replace(picture(np.zeros((8, 16, 3)), alpha=alpha), transparent=True)
+    window, rect = screen(16, 8), Rect(0, 0, 16, 8)
+    window.display.upload([whole])
+    window.display.upload([waiting])
+    assert_same(window.draw(rect), np.broadcast_to(mapped((0.8, 0.1, 0.1)), (8, 16, 3)))
+    empty = picture(np.zeros((8, 16, 3)), alpha=alpha)
+    window.display.upload([replace(empty, transparent=True, tile_spp=empty.tile_spp + 1)])
+    assert len(np.unique(window.draw(rect))) == 2
+
+
 @pytest.mark.parametrize(
     "rect", [Rect(0, 0, 111, 63), Rect(3.3, 2.6, 150.9, 85.7), Rect(-40.25, -20.5, 444, 250.9)]
 )

@@ -172,6 +172,7 @@ CHECKBOXES = [
     ("Object", "Thin walled", "scene.materials.lamp.thin_walled"),
     ("Object", "Snap", "preferences.snap.enabled"),
     ("Render", "NoR adapts", "scene.settings.nor_adapts"),
+    ("Render", "Transparent", "scene.settings.transparent"),
     ("Method", "Tile grid", "preferences.display.tile_grid"),
     ("Method", "Outline", "preferences.display.outline"),
     ("Method", "Split view", "preferences.display.split"),
