@@ -113,7 +113,7 @@ def test_light_of_lamps_comes_through_by_its_share(in_blocks: bool) -> None:
         np.testing.assert_allclose(mean(under_a_screen(gauze(alpha))), (1 - alpha) * free, rtol=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.statistics
 def test_light_and_bsdf_sampling_find_the_same_light() -> None:
     image = Environment((1, 1, 1))
     scene = under_a_screen(gauze(1, base_color_texture=holes()), environment=image)

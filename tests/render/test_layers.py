@@ -88,7 +88,7 @@ def test_blocks_and_wavefront_agree() -> None:
     assert_same_mean(*images)
 
 
-@pytest.mark.slow
+@pytest.mark.statistics
 @pytest.mark.parametrize("technique", ["MIS_ONLY_LIGHT", "MIS_ONLY_BSDF"])
 def test_each_technique_alone_gives_the_same(technique: str) -> None:
     arguments: dict[str, Any] = {"max_bounces": 2, "transmission_bounces": 6, "size": (32, 32)}
@@ -144,7 +144,7 @@ def test_the_pane_of_gltf_is_a_thin_wall() -> None:
     np.testing.assert_allclose(image.mean(axis=(0, 1)), np.array([5, 2, 1]) * 0.96 / 1.04, rtol=0.01)
 
 
-@pytest.mark.parametrize("in_blocks", [True, False])
+@pytest.mark.parametrize("in_blocks", [True, pytest.param(False, marks=pytest.mark.statistics)])
 def test_light_behind_a_window_is_sampled(in_blocks: bool) -> None:
     """As much arrives through a clear wall as through one that is tinted by next to nothing, with a fraction
     of the noise."""

@@ -244,7 +244,15 @@ FOUND = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("technique", ["MIS_ONLY_LIGHT", "MIS_ONLY_BSDF"])
-@pytest.mark.parametrize("names", [*FOUND, "rectangle,ball,sun", "disk,spot,sky", "glass,ball,sky"])
+@pytest.mark.parametrize(
+    "names",
+    [
+        *FOUND,
+        "rectangle,ball,sun",
+        pytest.param("disk,spot,sky", marks=pytest.mark.statistics),
+        pytest.param("glass,ball,sky", marks=pytest.mark.statistics),
+    ],
+)
 def test_each_technique_alone_gives_the_same(names: str, technique: str) -> None:
     chosen = [replace(FOUND[name], name=name) for name in names.split(",") if name in FOUND]
     scene = plates(*chosen, sky="sky" in names)

@@ -134,7 +134,10 @@ def test_few_lights_have_no_tree(device: Device) -> None:
     assert not has_tree(replace(few, lights=suns), device)
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name",
+    ["mixed", *(pytest.param(name, marks=pytest.mark.statistics) for name in SCENES if name != "mixed")],
+)
 def test_the_tree_changes_no_mean(name: str, trees: Callable[[bool], None]) -> None:
     images = []
     for wanted in (False, True):
@@ -145,6 +148,7 @@ def test_the_tree_changes_no_mean(name: str, trees: Callable[[bool], None]) -> N
     assert_same_mean(*images, relative=0.01)
 
 
+@pytest.mark.statistics
 @pytest.mark.parametrize("technique", ["MIS_ONLY_LIGHT", "MIS_ONLY_BSDF"])
 @pytest.mark.parametrize("name", ["mixed", "triangles"])
 def test_both_techniques_find_the_same(name: str, technique: str, trees: Callable[[bool], None]) -> None:
@@ -180,7 +184,13 @@ def wall_of_lights(roughness: float, metallic: float) -> Scene:
     return Scene(camera, Environment(), {"floor": floor}, (plane,), lights=panes)
 
 
-@pytest.mark.parametrize(("roughness", "metallic"), [(1.0, 0.0), (0.4, 1.0)], ids=["matte", "glossy"])
+@pytest.mark.parametrize(
+    ("roughness", "metallic"),
+    [
+        pytest.param(1.0, 0.0, id="matte"),
+        pytest.param(0.4, 1.0, id="glossy", marks=pytest.mark.statistics),
+    ],
+)
 def test_weights_of_large_lights(
     roughness: float, metallic: float, trees: Callable[[bool], None], device: Device
 ) -> None:
@@ -399,7 +409,15 @@ def test_pairs_have_one_tree(name: str, device: Device, trees: Callable[[bool], 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["move", "brighten", "add", "remove", "triangles go", "recolour"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "move",
+        "add",
+        "triangles go",
+        *(pytest.param(name, marks=pytest.mark.statistics) for name in ("brighten", "remove", "recolour")),
+    ],
+)
 def test_lights_of_two_scenes_bring_what_those_of_each_bring(
     name: str, device: Device, trees: Callable[[bool], None]
 ) -> None:

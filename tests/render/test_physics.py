@@ -346,7 +346,16 @@ def _sky() -> Environment:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", ["environment", "both", "rough glass", "rough glass, direct"])
+@pytest.mark.parametrize(
+    "case",
+    [
+        "both",
+        *(
+            pytest.param(case, marks=pytest.mark.statistics)
+            for case in ("environment", "rough glass", "rough glass, direct")
+        ),
+    ],
+)
 @pytest.mark.parametrize("technique", ["MIS_ONLY_LIGHT", "MIS_ONLY_BSDF"])
 def test_each_technique_alone_gives_the_same(case: str, technique: str) -> None:
     scene = {
@@ -676,7 +685,9 @@ def test_no_light_leaks_between_the_walls_of_a_room() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize(
+    "seed", [*range(4), *(pytest.param(seed, marks=pytest.mark.statistics) for seed in range(4, 12))]
+)
 def test_no_sample_is_undefined_or_negative(seed: int) -> None:
     # Extremes of every parameter at once; `render` asserts that all samples are finite.
     rng = np.random.default_rng(seed)

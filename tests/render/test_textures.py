@@ -318,7 +318,7 @@ def windows() -> Texture:
     return Texture(Bitmap(pixels), filter="nearest")
 
 
-@pytest.mark.slow
+@pytest.mark.statistics
 @pytest.mark.parametrize("double_sided", [False, True])
 def test_light_and_bsdf_sampling_find_the_same_light_of_a_texture(double_sided: bool) -> None:
     scene = sign(windows(), double_sided=double_sided)
