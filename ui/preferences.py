@@ -109,7 +109,8 @@ class DisplaySettings(_Group):
     """How the picture is shown; nothing here touches the accumulation. Raises InputError.
 
     `exposure` in stops (EV), `curve` one of CURVES, `overlay` one of OVERLAYS at `overlay_opacity`;
-    `split_position` is the place of the bar in units of the picture's width.
+    `split_position` is the place of the bar in units of the picture's width. `denoise`: a denoised picture is
+    shown where there is noise.
     """
 
     exposure: float = 0.0
@@ -120,6 +121,7 @@ class DisplaySettings(_Group):
     outline: bool = True
     split: bool = False
     split_position: float = 0.5
+    denoise: bool = False
 
 
 @dataclass(frozen=True)

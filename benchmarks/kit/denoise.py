@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.benchmarks.kit import options
+from incpt.picture.denoise import denoise
 
 FloatImage = npt.NDArray[np.float32]
 
@@ -19,11 +20,8 @@ class Denoiser:
     """Takes the noise away from pictures. Raises InputError where Open Image Denoise is not installed."""
 
     def __init__(self) -> None:
-        self._library = options.optional("pyoidn", "restart + OIDN", "denoise")
+        options.optional("pyoidn", "restart + OIDN", "denoise")
 
     def denoised(self, image: FloatImage, guides: Sequence[FloatImage]) -> FloatImage:
         """(H, W, 3) `image`, linear radiance, without its noise; `guides` are pictures of GUIDES."""
-        albedo, normal = guides
-        return np.asarray(
-            self._library.denoise(image, np.clip(albedo, 0, 1), np.clip(normal, -1, 1), hdr=True), np.float32
-        )
+        return denoise(image, *guides)

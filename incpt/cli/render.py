@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
+import numpy.typing as npt
 import typer
 
 from incpt.cli.console import Stopped, complain, interruption, path_progress
@@ -23,7 +25,11 @@ from incpt.core.errors import InputError, OutputError
 from incpt.core.settings import CUT_OFF_WORTH_TELLING, STRATEGIES
 
 if TYPE_CHECKING:
-    from incpt.render.session import StepReport
+    from incpt.picture.denoise import NoiseGauge
+    from incpt.render.session import Session, StepReport
+
+_LOOKS = (8, 4, 2)
+"""The parts of the samples after which a picture is looked at, to tell how noisy it is."""
 
 
 def render(
@@ -54,50 +60,90 @@ def render(
             help="Leave out the environment behind everything, and give the picture an alpha.",
         ),
     ] = False,
+    denoise: Annotated[
+        bool,
+        typer.Option(
+            "--denoise",
+            help="Show a denoised picture in the .png, or add one to the .exr as a layer, as far as there is "
+            "noise; needs the extra denoise.",
+        ),
+    ] = False,
     device: DeviceOption = None,
 ) -> None:
     """Render a scene to a picture. Ctrl-C keeps what is done."""
     from incpt.formats import registry
+    from incpt.picture import denoise as denoising
     from incpt.render.export import write_picture
     from incpt.render.session import Session
 
     _check_picture_path(output)
     if aovs and output.suffix.lower() != ".exr":
         raise InputError(f"--aovs: {output} cannot hold them; use an .exr")
+    if denoise:
+        denoising.require_denoiser()
     scene = registry.load(scene_file)
     if camera is not None:
         scene = scene.with_active_camera(camera)
     settings = settings_from(scene, size=size, seed=seed, strategy=strategy, max_bounces=max_bounces)
     settings = replace(settings, aovs=settings.aovs or aovs, transparent=settings.transparent or transparent)
-    session = Session(scene, settings=settings, device=device)
-    pixels = padded_pixels(settings)
-    nonfinite = paths = cut_off = 0
+    with_aovs = settings.aovs
+    # Base colours and normals help a denoiser.
+    session = Session(scene, settings=replace(settings, aovs=with_aovs or denoise), device=device)
+    pixels, tally, gauge = padded_pixels(settings), _Tally(), denoising.NoiseGauge()
     with interruption() as stop, path_progress("rendering", spp * pixels, pixels) as progress:
 
         def on_step(report: StepReport) -> None:
-            nonlocal nonfinite, paths, cut_off
-            nonfinite += report.nonfinite
-            paths += report.paths
-            cut_off += report.cut_off
+            tally.add(report)
             progress.advance(report.paths)
             stop.check()
 
         try:
+            for part in _LOOKS if denoise else ():
+                session.render(spp // part, on_step)
+                gauge.look(session.image(), session.spp())
             session.render(spp, on_step)
         except KeyboardInterrupt:
             if not stop.requested:
                 raise
         # Still inside, so that another Ctrl-C does not tear the picture that is kept.
-        write_picture(output, session, settings.aovs)
+        write_picture(output, session, with_aovs, denoised=_denoised(session, gauge) if denoise else None)
     samples = int(session.spp().min())
-    if nonfinite:
-        complain(f"warning: {nonfinite:,} samples were not finite and count as black", 0)
-    if cut_off > CUT_OFF_WORTH_TELLING * paths:
-        share = 100 * cut_off / paths
-        complain(f"warning: {share:.1f} % of the paths ended in glass; raise transmission_bounces", 0)
+    tally.complain()
     print(f"{output}: {session.size[0]} x {session.size[1]}, {samples} samples per pixel")
     if stop.requested:
         raise Stopped(f"stopped at {samples} of {spp} samples per pixel")
+
+
+@dataclass
+class _Tally:
+    """What steps have counted."""
+
+    paths: int = 0
+    nonfinite: int = 0
+    cut_off: int = 0
+
+    def add(self, report: StepReport) -> None:
+        self.paths += report.paths
+        self.nonfinite += report.nonfinite
+        self.cut_off += report.cut_off
+
+    def complain(self) -> None:
+        """Tell what is wrong with the picture."""
+        if self.nonfinite:
+            complain(f"warning: {self.nonfinite:,} samples were not finite and count as black", 0)
+        if self.cut_off > CUT_OFF_WORTH_TELLING * self.paths:
+            share = 100 * self.cut_off / self.paths
+            complain(f"warning: {share:.1f} % of the paths ended in glass; raise transmission_bounces", 0)
+
+
+def _denoised(session: Session, gauge: NoiseGauge) -> npt.NDArray[np.float32]:
+    """(H, W, 3) the picture with as much of a denoised one as its noise asks for."""
+    from incpt.picture import denoise
+
+    image = session.image()
+    gauge.look(image, session.spp())
+    clean = denoise.denoise(image, session.pass_image("albedo"), session.pass_image("normal"))
+    return denoise.mixed(image, clean, gauge.variance())
 
 
 def _check_picture_path(path: Path) -> None:

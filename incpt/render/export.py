@@ -5,6 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from incpt.core.errors import InputError
 from incpt.formats import images
 from incpt.render.session import Session
@@ -13,12 +16,18 @@ SUFFIXES = (".exr", ".png")
 
 
 def write_picture(
-    path: Path, session: Session, with_aovs: bool = False, exposure: float = 0.0, curve: str = "agx"
+    path: Path,
+    session: Session,
+    with_aovs: bool = False,
+    exposure: float = 0.0,
+    curve: str = "agx",
+    denoised: npt.NDArray[np.float32] | None = None,
 ) -> None:
     """Write the picture as it is now: .exr holds linear radiance and, `with_aovs`, auxiliary images as
     layers; .png is tone-mapped (see `tone_mapping.tone_map`). Under the setting `transparent` both have the
     picture's alpha: as programs expect, radiance is multiplied by it in .exr, and colours in .png are not.
-    Raises InputError for another suffix, and OutputError where the file cannot be written.
+    `denoised` (H, W, 3) is what .png then shows, and a layer of .exr, whose radiance stays as it was
+    rendered. Raises InputError for another suffix, and OutputError where the file cannot be written.
 
     Distance and object ids are those of rays through pixel centres. Base colours and normals are means over
     the samples of the picture where the session has the setting `aovs` or `transparent`, else of those rays
@@ -30,9 +39,13 @@ def write_picture(
     is_transparent = session.settings.transparent
     image = session.image(alpha=is_transparent)
     if suffix == ".png":
+        if denoised is not None:
+            image = np.concatenate([denoised, image[..., 3:]], axis=-1)
         images.write_png(path, image, exposure, curve)
         return
     layers: dict[str, Any] = {"RGBA" if is_transparent else "RGB": image}
+    if denoised is not None:
+        layers["denoised.RGB"] = denoised
     if with_aovs:
         hits = session.first_hits()
         # Object ids are unsigned in OpenEXR; the largest one stands for "none".

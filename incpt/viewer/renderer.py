@@ -23,12 +23,13 @@ class Pick:
 @dataclass(frozen=True)
 class Export:
     """Write the picture: .exr is linear radiance, `aovs` adds auxiliary images; .png is tone-mapped as
-    `exposure` and `curve` say."""
+    `exposure` and `curve` say. `denoise`: .png is the denoised picture, which .exr has as a layer."""
 
     path: Path
     aovs: bool = False
     exposure: float = 0.0
     curve: str = "agx"
+    denoise: bool = False
 
 
 @dataclass(frozen=True)

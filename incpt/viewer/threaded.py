@@ -17,6 +17,7 @@ from functools import partial
 from incpt.core.errors import DeviceError, InputError, OutputError, one_line
 from incpt.device.device import Device
 from incpt.scene.model import Scene
+from incpt.viewer.denoising import DenoisingThread
 from incpt.viewer.renderer import Building, Export, Exported, Message, Pick, Picked, Pin, Problem, Request
 from incpt.viewer.view import Frame, View
 from incpt.viewer.viewer import RenderingStoppedError, Viewer
@@ -46,6 +47,7 @@ class ThreadedRenderer:
         self._images: tuple[object, ...] = ()
         self._posted_at = 0.0
         self._drawn: Scene | None = None
+        self._denoiser = DenoisingThread(self._post, lambda text: self._post(Problem(text)))
         self._thread = threading.Thread(target=self._run, name="renderer", daemon=True)
         self._thread.start()
 
@@ -74,6 +76,7 @@ class ThreadedRenderer:
             self._closing = True
             self._condition.notify()
         self._thread.join()
+        self._denoiser.close()
 
     def _post(self, message: Message) -> None:
         with self._condition:
@@ -151,7 +154,7 @@ class ThreadedRenderer:
                 if not viewer.prepare():
                     self._wait_for_news(view)
             elif self._is_worth_showing(frame):
-                self._post(frame)
+                self._post(self._denoiser.shown(frame))
                 if viewer.device.is_cpu:
                     self._let_draw(frame)
 
@@ -174,7 +177,8 @@ class ThreadedRenderer:
             if isinstance(request, Pick):
                 self._post(Picked(request.point, viewer.pick(request.point), request.additive))
             elif isinstance(request, Export):
-                viewer.export(request.path, request.aovs, request.exposure, request.curve)
+                denoised = self._denoiser.denoised if request.denoise else None
+                viewer.export(request.path, request.aovs, request.exposure, request.curve, denoised)
                 self._post(Exported(request.path))
             elif isinstance(request, Pin):
                 viewer.pin_reference(request.on)

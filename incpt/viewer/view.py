@@ -29,6 +29,7 @@ class View:
     drag_nor          the most repetitions of a tile while a drag is under way.
     split             also render under "restart", fed with the same edits.
     first_hits        whether first hits are wanted.
+    denoise           whether a denoised picture is wanted, see `denoising.py`.
     """
 
     scene: Scene
@@ -41,6 +42,12 @@ class View:
     drag_nor: int = 16
     split: bool = False
     first_hits: bool = False
+    denoise: bool = False
+
+    @property
+    def needs_first_hits(self) -> bool:
+        """Whether first hits are traced: they help a denoiser too."""
+        return self.first_hits or (self.denoise and not self.scene.camera.has_lens)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -64,6 +71,7 @@ class Picture:
     error_left  the share of the visible error of an edit that is left, as `Session.error_left` has it.
     findings    what is known of the edit, tile by tile; None: nothing yet.
     transparent whether the picture can be seen through, as the setting says.
+    denoised    (h, w, 4) what is shown in place of `image`, or None.
     """
 
     image: Float32Image
@@ -79,6 +87,12 @@ class Picture:
     error_left: float | None = None
     findings: Findings | None = None
     transparent: bool = False
+    denoised: Float32Image | None = None
+
+    @property
+    def shown(self) -> Float32Image:
+        """(h, w, 4) what is shown."""
+        return self.image if self.denoised is None else self.denoised
 
 
 @dataclass(frozen=True, eq=False)

@@ -134,9 +134,16 @@ class Viewer:
         self._reference, self._is_pinning = None, on
         self._rest_is_shown = False
 
-    def export(self, path: str | Path, aovs: bool = False, exposure: float = 0.0, curve: str = "agx") -> None:
+    def export(
+        self,
+        path: str | Path,
+        aovs: bool = False,
+        exposure: float = 0.0,
+        curve: str = "agx",
+        denoised: Callable[[Session], Float32Image] | None = None,
+    ) -> None:
         """Write the picture of the chosen strategy at full resolution; see `write_picture`. Where it is not
-        whole yet, that is done first."""
+        whole yet, that is done first. `denoised` makes the denoised picture of a session, if it is wanted."""
         place, main = len(self._seats) - 1, self._main
         if main.divisor > 1:
             settings = scheduler.settings_of(main.view, main.strategy, main.whole, 1)
@@ -144,7 +151,8 @@ class Viewer:
         while self.session.mode is Mode.BASE:
             slots = scheduler.slots_of_step(self._main, self._state.view.step_ms)
             self._step(Step(place, slots, self._state.spent))
-        write_picture(Path(path), self.session, aovs, exposure, curve)
+        clean = None if denoised is None else denoised(self.session)
+        write_picture(Path(path), self.session, aovs, exposure, curve, clean)
 
     # ------------------------------------------------------------------------------------ following the view
 
@@ -260,7 +268,7 @@ class Viewer:
         """Whether all first hits are there that are wanted; some rows more of them, unless an edit waits for
         its answer."""
         view, main = self._state.view, self._main
-        if not view.first_hits:
+        if not view.needs_first_hits:
             return True
         return (main.is_answered or is_idle) and self._hits.advance(view, main)
 
@@ -294,7 +302,7 @@ class Viewer:
             step_seconds=self._step_seconds,
             paths_per_second=self._speed,
             device=self.device.name,
-            first_hits=self._hits.first_hits if view.first_hits else None,
+            first_hits=self._hits.first_hits if view.needs_first_hits else None,
             nonfinite=sum(side.nonfinite for side in self._state.sides),
             cut_off=scheduler.share_cut_off(self._state.sides),
             resting=resting,

@@ -23,6 +23,8 @@ from incpt.cli.main import main
 from incpt.core.errors import DeviceError, OutputError
 from incpt.device.device import all_devices
 from incpt.formats import registry, scene_save
+from incpt.picture import denoise
+from incpt.picture.tone_mapping import tone_map
 from incpt.render.session import Session, StepReport
 
 SCENE = """
@@ -419,3 +421,45 @@ def test_an_editor_that_is_not_there(
     monkeypatch.setattr(importlib, "import_module", find)
     assert main(["edit"]) == 1
     assert said in only_line(capsys.readouterr().err)
+
+
+# ------------------------------------------------------------------------------------------ denoise
+
+
+def half_as_bright(image: np.ndarray, albedo: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    assert albedo.shape == normal.shape == image.shape and albedo.any()
+    return image / 2
+
+
+@pytest.mark.slow
+def test_a_denoised_picture_is_shown_in_png_and_a_layer_of_exr(
+    scene_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(denoise, "is_available", lambda: True)
+    monkeypatch.setattr(denoise, "denoise", half_as_bright)
+    for suffix in ("exr", "png"):
+        assert run("render", scene_file, "-o", tmp_path / f"a.{suffix}", "--spp", 2, "--denoise") == 0
+    channels = OpenEXR.File(str(tmp_path / "a.exr")).channels()
+    rendered, shown = (np.asarray(channels[name].pixels) for name in ("RGB", "denoised"))
+    session = Session(registry.load(scene_file))
+    session.render(2)
+    np.testing.assert_array_equal(rendered, session.image())
+    # So few samples are all noise.
+    np.testing.assert_allclose(shown, rendered / 2, rtol=1e-4, atol=1e-6)
+    assert {"albedo", "normal.X", "depth.Z"}.isdisjoint(channels)
+    with PIL.Image.open(tmp_path / "a.png") as file:
+        assert np.abs(np.asarray(file).astype(int) - tone_map(shown)).max() <= 1
+    assert run("render", scene_file, "-o", tmp_path / "b.exr", "--spp", 256, "--denoise") == 0
+    channels = OpenEXR.File(str(tmp_path / "b.exr")).channels()
+    rendered, shown = (np.asarray(channels[name].pixels) for name in ("RGB", "denoised"))
+    # Many have nearly none, so that next to nothing is taken of what has another brightness.
+    assert 0.99 < shown.mean() / rendered.mean() <= 1
+
+
+def test_without_the_denoiser_nothing_is_rendered(
+    scene_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(denoise, "is_available", lambda: False)
+    assert run("render", scene_file, "-o", tmp_path / "a.png", "--denoise") == 2
+    assert 'pip install "incpt[denoise]"' in only_line(capsys.readouterr().err)
+    assert not (tmp_path / "a.png").exists()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from incpt.core.errors import InputError
@@ -24,11 +25,13 @@ def export_picture(editor: Editor) -> None:
 
 
 def export_to(editor: Editor, path: Path) -> None:
-    """Write the picture: PNG as it is shown, EXR linear with the AOVs."""
+    """Write the picture: PNG as it is shown, EXR linear with the AOVs, and denoised too where that is
+    shown."""
     if path.suffix.lower() not in PICTURES.suffixes:
         raise InputError(f"{path}: ends in no known format; use .exr or .png")
     display = editor.preferences.display
-    editor.renderer.request(Export(path, aovs=True, exposure=display.exposure, curve=display.curve))
+    request = Export(path, aovs=True, exposure=display.exposure, curve=display.curve)
+    editor.renderer.request(replace(request, denoise=editor.view.denoise))
 
 
 def copy_picture(editor: Editor) -> None:
@@ -36,6 +39,6 @@ def copy_picture(editor: Editor) -> None:
     assert editor.frame is not None
     display = editor.preferences.display
     picture = editor.frame.pictures[-1]
-    image = picture.image if picture.transparent else picture.image[..., :3]
+    image = picture.shown if picture.transparent else picture.shown[..., :3]
     clipboard.copy_picture(tone_mapping.tone_map_covered(image, display.exposure, display.curve))
     editor.say("the picture is on the clipboard", "done")

@@ -10,6 +10,7 @@ from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
+from incpt.picture import denoise
 from incpt.scene.edits import LIGHT_NAMES
 from incpt.scene.shapes import SHAPES
 from incpt.ui.commands import camera, files, objects, pictures, rendering
@@ -53,6 +54,11 @@ def _switch_display(name: str) -> Action:
         editor.change_display(replace(display, **changes))
 
     return switch
+
+
+def _switch_denoise(editor: Editor) -> None:
+    denoise.require_denoiser()
+    _switch_display("denoise")(editor)
 
 
 def _displays(name: str) -> Test:
@@ -168,6 +174,8 @@ COMMANDS: tuple[Command, ...] = (
             help="Lines between tiles"),
     Command("Outline", "View", _switch_display("outline"), "F8", group=1, checked=_displays("outline"),
             help="Outline around the selection"),
+    Command("Denoise", "View", _switch_denoise, "F4", group=1, checked=_displays("denoise"),
+            help="Show the picture without its noise; what is rendered stays as it is"),
     *(Command(text, "View/Overlay", _overlay(name), checked=_shows_overlay(name), group=1)
       for name, text in OVERLAY_TEXTS.items()),
     Command("Match window", "View", rendering.match_window, group=2,

@@ -45,9 +45,9 @@ class PictureTextures:
     def upload(self, picture: Picture) -> None:
         old = self.picture
         self.picture = picture
-        if old is not None and old.image is picture.image:
+        if old is not None and old.shown is picture.shown:
             return
-        image = self._fitting(picture.image)
+        image = self._fitting(picture.shown)
         height, width = image.shape[:2]
         if self.radiance is None or self.radiance.size != (width, height):
             self._resize(width, height, old)

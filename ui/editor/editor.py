@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from incpt.core.errors import DeviceError, InputError, OutputError, one_line
+from incpt.picture import denoise
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
 from incpt.ui.display.overlays import NEEDS_FIRST_HITS
@@ -169,6 +170,7 @@ class Editor:
             drag_nor=self.preferences.drag_nor,
             split=display.split,
             first_hits=display.overlay in NEEDS_FIRST_HITS,
+            denoise=display.denoise and denoise.is_available(),
         )
 
     def resize_viewport(self, size: tuple[int, int] | None) -> None:

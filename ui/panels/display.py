@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from incpt.picture import denoise
 from incpt.ui.preferences import DisplaySettings
 from incpt.ui.widgets import widgets
 from incpt.ui.widgets.refusals import Refusals
@@ -23,6 +24,9 @@ OVERLAY_TEXTS = {
     "weight": "Weight of the old picture",
 }
 """How panel and menu name the overlays, in the order of the menu."""
+_DENOISE_TIP = (
+    "For the eye alone: what is rendered stays as it is. Where little noise is left, nothing is denoised"
+)
 
 
 def draw(display: DisplaySettings, refusals: Refusals) -> DisplaySettings:
@@ -31,6 +35,9 @@ def draw(display: DisplaySettings, refusals: Refusals) -> DisplaySettings:
         "Exposure", display.exposure, low=-10.0, high=10.0, speed=0.02, unit=" EV", decimals=2
     )
     curve = widgets.choice("Curve", display.curve, list(CURVE_TEXTS.items()), "Tone mapping")
+    denoised = display.denoise
+    if denoise.is_available():
+        denoised = widgets.checkbox("Denoise", denoised, _DENOISE_TIP)
     overlay = widgets.choice("Overlay", display.overlay, list(OVERLAY_TEXTS.items()), "Laid over the picture")
     opacity = display.overlay_opacity
     if overlay != "none":
@@ -42,6 +49,7 @@ def draw(display: DisplaySettings, refusals: Refusals) -> DisplaySettings:
         display,
         exposure=exposure,
         curve=curve,
+        denoise=denoised,
         overlay=overlay,
         overlay_opacity=opacity,
         tile_grid=grid,

@@ -52,7 +52,7 @@ def status_text(frame: Frame | None, is_paused: bool, selection: Selection) -> s
             parts.append("Paused" if is_paused else MODE_TEXTS[picture.mode])
         if found is not None:
             parts.append(found)
-        parts.append(_samples_text(picture, found is not None))
+        parts.append(_samples_text(picture, found is not None) + _denoised_text(picture))
         if picture.error is not None:
             parts.append(f"RMSE {picture.error:.5f}")
     names = selection.names
@@ -69,6 +69,10 @@ def _samples_text(picture: Picture, is_finding: bool) -> str:
         return f"worth {picture.tile_spp.mean():,.0f} samples per pixel on average"
     samples = int(picture.tile_spp.min())
     return f"{samples:,} {'sample' if samples == 1 else 'samples'} per pixel"
+
+
+def _denoised_text(picture: Picture) -> str:
+    return "" if picture.denoised is None else ", denoised"
 
 
 def draw_notices(notices: Sequence[Notice], picture: Rect[float]) -> Notice | None:
