@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
-import numpy.typing as npt
 import typer
 
 from incpt.cli.console import Stopped, complain, interruption, path_progress
@@ -25,6 +23,9 @@ from incpt.core.errors import InputError, OutputError
 from incpt.core.settings import CUT_OFF_WORTH_TELLING, STRATEGIES
 
 if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
     from incpt.picture.denoise import NoiseGauge
     from incpt.render.session import Session, StepReport
 
