@@ -44,8 +44,9 @@ class Material:
 
     From the bottom up: metal or a diffuse base, which lets `diffuse_transmission` of its light through to the
     other side, in `diffuse_transmission_color`; on it the reflection of `ior`, `specular` and
-    `specular_color`, of metal that of `base_color`, stretched along the tangent by `anisotropy` (turned by
-    `anisotropy_rotation` degrees, counter-clockwise) and in the colours of a film of `iridescence_ior` and
+    `specular_color`, of metal that of `base_color`, stretched by `anisotropy` along the direction of u, or
+    where a mesh has no texture coordinates around the object's y axis (turned by `anisotropy_rotation`
+    degrees, counter-clockwise), and in the colours of a film of `iridescence_ior` and
     `iridescence_thickness` nm as far as `iridescence` says; then `sheen_color`, the fuzz of cloth; then
     `clearcoat`, a colourless lacquer with an index of refraction of 1.5. Each lets through what it does not
     reflect. Sheen, clearcoat, anisotropy and film belong to what is not transmissive.

@@ -5,6 +5,9 @@ Normal maps are made for tangents that are computed in one way, and look wrong w
 where they have the same position, normal and texture coordinates and their faces the same orientation in the
 image: the mean of the directions of u of their faces, each along the surface at the corner and weighted by
 the angle that the face has there. No library of it has wheels for the systems that incpt runs on.
+
+Where texture coordinates tell no direction, tangents run along the parallels around the y axis, as grooves of
+a lathe do: y x normal, which turns as the normal does, so that surfaces with smooth normals have no seams.
 """
 
 from __future__ import annotations
@@ -18,21 +21,23 @@ Array = npt.NDArray[np.float64]
 
 _LEAST = 1e-30
 """Lengths below it have no direction."""
+_POLE = 1e-3
+"""Sines of the angle to the y axis below it have no parallel: beside it rounding would tell the direction."""
 
 
 def corner_tangents(mesh: Mesh, uv_set: int = 0) -> npt.NDArray[np.float32]:
     """(F, 3, 4) unit tangents at the corners, perpendicular to the normals there, and the side on which v
     grows: 1 where that is normal x tangent, else -1. Object space.
 
-    Any direction along the surface where the mesh has no such texture coordinates, or where they do not tell
-    one. The tangents that a mesh brings are taken as they are.
+    Along the parallel around the y axis where the mesh has no such texture coordinates, or where they do not
+    tell a direction. The tangents that a mesh brings are taken as they are.
     """
     if mesh.tangents is not None:
         return mesh.tangents
     corners = mesh.vertices[mesh.faces].astype(np.float64)
     normals = _normals(mesh, corners)
     if uv_set >= len(mesh.uvs):
-        return _joined(_perpendicular(normals), np.full(len(corners), 1.0))
+        return _joined(_parallels(normals), np.full(len(corners), 1.0))
     uvs = mesh.uvs[uv_set].astype(np.float64)
     directions, side, is_known = _directions(corners, uvs)
     along = _along(np.broadcast_to(directions[:, None], normals.shape), normals)
@@ -42,7 +47,7 @@ def corner_tangents(mesh: Mesh, uv_set: int = 0) -> npt.NDArray[np.float32]:
     tangents = sums[group].reshape(normals.shape)
     length = np.linalg.norm(tangents, axis=2, keepdims=True)
     usable = length > _LEAST
-    unit: Array = np.where(usable, tangents / np.where(usable, length, 1), _perpendicular(normals))
+    unit: Array = np.where(usable, tangents / np.where(usable, length, 1), _parallels(normals))
     return _joined(unit, side)
 
 
@@ -93,10 +98,16 @@ def _groups(corners: Array, normals: Array, uvs: Array, side: Array) -> npt.NDAr
     return np.unique(whole, return_inverse=True)[1].reshape(-1)
 
 
-def _perpendicular(normals: Array) -> Array:
-    """Unit vectors that are perpendicular to unit vectors (..., 3)."""
-    axis = np.where(np.abs(normals[..., :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
-    return _along(axis, normals)
+def _parallels(normals: Array) -> Array:
+    """(F, 3, 3) unit tangents along the parallels around the y axis, for unit normals at corners, eastwards
+    on a ball. At a pole that of the other corners of the face, so that faces around it are like their
+    neighbours; x where all of them are poles."""
+    east = np.cross([0.0, 1.0, 0.0], normals)
+    east = np.where(np.linalg.norm(east, axis=2, keepdims=True) > _POLE, _along(east, normals), 0.0)
+    for other in (east.sum(axis=1, keepdims=True), np.array([1.0, 0.0, 0.0])):
+        is_known = east.any(axis=2, keepdims=True)
+        east = np.where(is_known, east, _along(np.broadcast_to(other, normals.shape), normals))
+    return east
 
 
 def _joined(tangents: Array, side: Array) -> npt.NDArray[np.float32]:

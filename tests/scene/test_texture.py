@@ -151,10 +151,36 @@ def test_corners_share_a_tangent_where_the_surface_is_smooth() -> None:
     np.testing.assert_allclose(np.abs(apart[..., 1]), 0.5 / np.hypot(1, 0.5), atol=1e-5)
 
 
-def test_meshes_without_texture_coordinates_have_tangents_too() -> None:
-    for mesh in (replace(shape("cube"), uvs=()), replace(shape("cube"), uvs=(np.zeros((12, 3, 2)),))):
-        tangents = corner_tangents(mesh)
-        np.testing.assert_allclose(np.linalg.norm(tangents[..., :3], axis=2), 1, atol=1e-5)
+def test_tangents_without_texture_coordinates_go_along_parallels() -> None:
+    """On a ball, but for its poles, all faces at a corner have one tangent, which is along u."""
+    ball = shape("sphere")
+    bare, along_u = corner_tangents(replace(ball, uvs=())), corner_tangents(ball)
+    shared = np.full((len(ball.vertices), 4), np.nan)
+    shared[ball.faces] = bare
+    height = np.abs(ball.vertices[ball.faces][..., 1])
+    np.testing.assert_allclose(bare[height < 0.4999], shared[ball.faces][height < 0.4999], atol=1e-6)
+    assert ((bare * along_u)[height < 0.45][:, :3].sum(axis=1) > 0.999).all()
+    assert (bare[..., 3] == 1).all()
+
+
+def test_tangents_at_a_pole_are_those_of_the_face() -> None:
+    """A cone's tip, whose normal is the y axis: what is brushed around the y axis is so up to there."""
+    angle = np.arange(8) * np.pi / 4
+    rim = np.column_stack([np.sin(angle), np.zeros(8), np.cos(angle)])
+    faces = np.array([(8, i, (i + 1) % 8) for i in range(8)])
+    normals = np.concatenate([rim, [[1e-5, 0, 0]]])[faces] + np.array([0, 1, 0])
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    cone = Mesh(np.concatenate([rim, [[0, 1, 0]]]), faces, normals)
+    tangents = corner_tangents(cone)
+    around = (rim[faces[:, 1]] + rim[faces[:, 2]])[:, [2, 1, 0]] * [1, 1, -1]
+    around /= np.linalg.norm(around, axis=1, keepdims=True)
+    np.testing.assert_allclose(tangents[:, 0, :3], around, atol=1e-4)
+    # Without smooth normals the faces of a box that face up have x, and those at its sides go around it.
+    for box in (replace(shape("cube"), uvs=()), replace(shape("cube"), uvs=(np.zeros((12, 3, 2)),))):
+        corners = box.vertices[box.faces].astype(np.float64)
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        expected = np.where(np.abs(normal[:, 1:2]) > 0.5, [1, 0, 0], np.cross([0, 1, 0], normal))
+        np.testing.assert_allclose(corner_tangents(box)[:, 1, :3], expected, atol=1e-6)
 
 
 def test_tangents_that_a_mesh_brings_are_taken() -> None:
