@@ -307,7 +307,11 @@ STAGE void setup_surfaces(const Block *block, BlockRay *ray) {
     LANES
     for (int i = 0; i < (int)count; i++) {
         const RawHit hit = load_raw_hit(block, i);
-        const Surface surface = surface_at(&block->geometry, &hit);
+        Surface surface = surface_at(&block->geometry, &hit);
+#ifndef FLAT
+        settle_rise(block->shading.materials, load_ray(block->state.rays, BLOCK_STRIDE, i).direction,
+                    &surface);
+#endif
         store_surface(&block->state, i, &surface);
     }
 #ifdef TANGENTS

@@ -65,6 +65,9 @@ __kernel __attribute__((vec_type_hint(float8))) void intersect(LAUNCH_PARAMETERS
         return;
     }
     Surface surface = surface_at(&geometry, &hit);
+#ifndef FLAT
+    settle_rise(materials, load_ray(rays, state.stride, path).direction, &surface);
+#endif
 #ifdef TANGENTS
     set_tangents(objects, &shading, &surface);
 #endif

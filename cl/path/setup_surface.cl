@@ -92,6 +92,52 @@ INLINE Vec3 shading_normal(__global const Object *object, __global const float *
     return select(smooth, shading, geometric);
 }
 
+#ifndef FLAT
+// Where a corner's normal is farther off that of the face, an edge was smoothed over, and no curve is meant.
+#define LEAST_SMOOTH_COSINE 0.75f
+
+// How far the surface that the normals at corners pretend stands above a point of a face: half of what the
+// planes do that are perpendicular to them there, interpolated. That is a ball's own surface if they are the
+// ball's, and the same for both faces at an edge. Below 0 where it is hollow. Everything is in object space;
+// `ab` and `ac` are the edges from the first corner, and `up` is the unit normal of the face.
+INLINE float pretended_height(__global const Object *object, __global const float *normals, uint face,
+                              Vec3 weight, Vec3 ab, Vec3 ac, Vec3 up) {
+    __global const float *n = normals + object->first_normal + 9u * (size_t)object->is_smooth * face;
+    Vec3 a = vec3(n[0], n[1], n[2]), b = vec3(n[3], n[4], n[5]), c = vec3(n[6], n[7], n[8]);
+    Vec3 to_a = scale(-1.0f, add(scale(weight.y, ab), scale(weight.z, ac)));
+    Vec3 cosine = vec3(dot(a, up), dot(b, up), dot(c, up));
+    float height = weight.x * dot(to_a, a) / cosine.x + weight.y * dot(add(to_a, ab), b) / cosine.y +
+                   weight.z * dot(add(to_a, ac), c) / cosine.z;
+    int all_up = MIN(cosine.x, MIN(cosine.y, cosine.z)) > LEAST_SMOOTH_COSINE;
+    int all_down = MAX(cosine.x, MAX(cosine.y, cosine.z)) < -LEAST_SMOOTH_COSINE;
+    return (object->is_smooth != 0u) & (all_up | all_down) ? 0.5f * height : 0.0f;
+}
+
+// A vector of world space in object space.
+INLINE Vec3 object_vector(__global const Object *object, Vec3 v) {
+    __global const float *m = object->object_from_world;
+    return vec3(m[0] * v.x + m[1] * v.y + m[2] * v.z, m[4] * v.x + m[5] * v.y + m[6] * v.z,
+                m[8] * v.x + m[9] * v.y + m[10] * v.z);
+}
+
+// As world_normal, the other way.
+INLINE Normal object_normal(__global const Object *object, Vec3 normal) {
+    __global const float *m = object->world_from_object;
+    return normal_along(vec3(m[0] * normal.x + m[4] * normal.y + m[8] * normal.z,
+                             m[1] * normal.x + m[5] * normal.y + m[9] * normal.z,
+                             m[2] * normal.x + m[6] * normal.y + m[10] * normal.z));
+}
+
+// The same of a triangle in world space, in world space.
+INLINE float pretended_world_height(__global const Object *object, __global const float *normals, uint face,
+                                    Vec3 weight, Vec3 ab, Vec3 ac, Vec3 up) {
+    Normal normal = object_normal(object, up);
+    return pretended_height(object, normals, face, weight, object_vector(object, ab),
+                            object_vector(object, ac), normal.direction) /
+           normal.inverse_length;
+}
+#endif
+
 // The surface of a hit. The weights of the corners may have a common factor.
 INLINE Surface surface_at(const Geometry *geometry, const RawHit *hit) {
     __global const Object *object = geometry->objects + hit->object;
@@ -143,6 +189,15 @@ INLINE Surface surface_at(const Geometry *geometry, const RawHit *hit) {
 #endif
     Surface surface;
     surface.face = pack->face[lane];
+#ifndef FLAT
+    Vec3 at = vec3(1.0f - inwards * (to_b + to_c), inwards * to_b, inwards * to_c);
+    surface.rise = object->winding * pretended_world_height(object, geometry->normals, surface.face, at, ab,
+                                                            ac, normal.direction);
+#ifndef TOP_LEVEL_ONLY
+    float in_object = pretended_height(object, geometry->normals, surface.face, at, ab, ac, normal.direction);
+    surface.rise = on_top ? surface.rise : in_world.inverse_length * in_object;
+#endif
+#endif
     surface.offset = offset + MIN(clear, DISTANCE_SHARE * hit->distance);
     surface.position = position;
     surface.geometric = geometric;
@@ -158,6 +213,17 @@ INLINE Surface surface_at(const Geometry *geometry, const RawHit *hit) {
     surface.weight_c = weight.z;
     return surface;
 }
+
+#ifndef FLAT
+// Leaves the rise of a surface where rays need it: on the side that the ray along `direction` has come from,
+// and where no light is let through, which would start below.
+INLINE void settle_rise(__global const Material *materials, Vec3 direction, Surface *surface) {
+    __global const Material *material = &materials[surface->material];
+    int is_opaque = (material->transmission <= 0.0f) & (material->diffuse_transmission <= 0.0f);
+    int is_seen = surface->rise * dot(surface->geometric, direction) < 0.0f;
+    surface->rise = is_opaque & is_seen ? surface->rise : 0.0f;
+}
+#endif
 
 // Which stage shades a path that has hit this object. A path that has hit nothing is given any answer.
 INLINE uint hit_class(const Geometry *geometry, __global const Material *materials, uint object,

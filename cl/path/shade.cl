@@ -26,7 +26,9 @@ INLINE void finish_path(const Params *params, const Shading *shading, const Stat
 
 // Whether a ray in this direction, which is wi in the frame of the surface, leaves it on the side that it
 // scatters to, and where it starts. That is the side that the path has come to, and the other one where light
-// is transmitted diffusely.
+// is transmitted diffusely. Where smooth normals pretend a surface above the face, a ray may go below the
+// plane of the face, and starts up there, else it would meet the face (J. Hanika, Hacking the Shadow
+// Terminator, Ray Tracing Gems II, 2021).
 INLINE int leaves_surface(const Surface *surface, Vec3 direction, Vec3 wi, Vec3 *origin) {
     float above = dot(surface->geometric, direction);
 #if HAS_TRAIT(DIFFUSE_TRANSMISSION)
@@ -35,6 +37,11 @@ INLINE int leaves_surface(const Surface *surface, Vec3 direction, Vec3 wi, Vec3 
 #else
     float offset = surface->offset;
     int leaves = above > 0.0f;
+#endif
+#ifndef FLAT
+    int from_above = (!leaves) & (wi.z > 0.0f) & (surface->rise > 0.0f);
+    offset = from_above ? surface->offset + surface->rise : offset;
+    leaves |= from_above;
 #endif
     *origin = along(surface->position, offset, surface->geometric);
     return leaves;

@@ -136,6 +136,7 @@ INLINE uint is_in_medium(const State *state, uint path) {
 typedef struct {
     Vec3 geometric, shading; // normals, of unit length
     float offset;            // how far along the geometric normal a ray must start to be clear of the surface
+    float rise;              // but if FLAT: how much farther one does that goes below the plane of the face
     float distance;          // along the ray
     Vec3 position;
     uint object, material, face;
@@ -155,6 +156,9 @@ INLINE Surface load_surface(const State *state, uint path) {
     s.object = load_bits(state->surfaces, SURFACE_OBJECT * stride + path);
     s.material = load_bits(state->surfaces, SURFACE_MATERIAL * stride + path);
     s.face = load_bits(state->surfaces, SURFACE_FACE * stride + path);
+#ifndef FLAT
+    s.rise = state->surfaces[SURFACE_RISE * stride + path];
+#endif
 #ifdef CORNER_ATTRIBUTES
     s.weight_b = state->surfaces[SURFACE_WEIGHT_B * stride + path];
     s.weight_c = state->surfaces[SURFACE_WEIGHT_C * stride + path];
@@ -178,6 +182,9 @@ INLINE void store_surface(const State *state, uint path, const Surface *s) {
     store_bits(state->surfaces, SURFACE_OBJECT * stride + path, s->object);
     store_bits(state->surfaces, SURFACE_MATERIAL * stride + path, s->material);
     store_bits(state->surfaces, SURFACE_FACE * stride + path, s->face);
+#ifndef FLAT
+    state->surfaces[SURFACE_RISE * stride + path] = s->rise;
+#endif
 #ifdef CORNER_ATTRIBUTES
     state->surfaces[SURFACE_WEIGHT_B * stride + path] = s->weight_b;
     state->surfaces[SURFACE_WEIGHT_C * stride + path] = s->weight_c;
@@ -231,6 +238,7 @@ INLINE float orient_surface(Surface *surface, Vec3 direction, int mirrors) {
     surface->geometric = scale(side, surface->geometric);
     surface->shading = scale(side, surface->shading);
 #ifndef FLAT
+    surface->rise *= side;
     Vec3 towards = select(dot(surface->shading, direction) < -1e-4f, surface->shading, surface->geometric);
     Vec3 mirroring = mirroring_normal(surface->shading, surface->geometric, scale(-1.0f, direction));
     surface->shading = select(mirrors, mirroring, towards);

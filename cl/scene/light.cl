@@ -157,7 +157,7 @@ INLINE Uvs light_uvs(__global const float *lights, uint stride, uint light, floa
 // surface, which would be in its way. That is the more the flatter the light is seen, but never so much that
 // the ray passes by what stands before the light.
 INLINE LightSample sample_triangle_point(const Params *params, const Shading *shading,
-                                         const Emitters *emitters, Vec3 position, Vec3 step, Uniform2 uv,
+                                         const Emitters *emitters, const Starts *starts, Uniform2 uv,
                                          uint light) {
     uint stride = params->light_count;
     __global const float *lights = emitters->lights;
@@ -168,7 +168,7 @@ INLINE LightSample sample_triangle_point(const Params *params, const Shading *sh
     Vec3 edge_2 = light_vec3(lights + LIGHT_EDGE_2_X * stride, stride, light);
     Vec3 point = add(vertex, add(scale(b1, edge_1), scale(b2, edge_2)));
     Vec3 normal = normalize(cross(edge_1, edge_2));
-    Vec3 to_light = subtract(point, start_towards(point, position, step));
+    Vec3 to_light = subtract(point, start_towards(point, starts));
     float squared = dot(to_light, to_light);
     float distance = SQRT(squared);
     LightSample result;
@@ -193,10 +193,10 @@ INLINE LightSample sample_triangle_point(const Params *params, const Shading *sh
 
 // `choice` selects the triangle.
 INLINE LightSample sample_triangle_light(const Params *params, const Shading *shading,
-                                         const Emitters *emitters, Vec3 position, Vec3 step, Uniform2 uv,
+                                         const Emitters *emitters, const Starts *starts, Uniform2 uv,
                                          float choice) {
     uint light = chosen_triangle(params, emitters, choice);
-    return sample_triangle_point(params, shading, emitters, position, step, uv, light);
+    return sample_triangle_point(params, shading, emitters, starts, uv, light);
 }
 #endif
 
@@ -266,12 +266,12 @@ INLINE float choice_among_triangles(const Params *params, float choice) {
 // The choices begin with those of the environment; then come lights that are objects of their own, and
 // triangles.
 INLINE LightSample sample_any_light(const Params *params, const Shading *shading, const Emitters *emitters,
-                                    Vec3 position, Vec3 step, Uniform2 uv, float choice) {
+                                    const Starts *starts, Uniform2 uv, float choice) {
     LightSample result =
-        sample_shaped_light(params, emitters, position, step, uv, choice_among_shaped(params, choice));
+        sample_shaped_light(params, emitters, starts, uv, choice_among_shaped(params, choice));
 #ifdef TRIANGLE_LIGHTS
-    LightSample triangle = sample_triangle_light(params, shading, emitters, position, step, uv,
-                                                 choice_among_triangles(params, choice));
+    LightSample triangle =
+        sample_triangle_light(params, shading, emitters, starts, uv, choice_among_triangles(params, choice));
     result = select_sample(choice >= params->environment_probability + params->shaped_probability, triangle,
                            result);
 #endif
@@ -288,8 +288,7 @@ INLINE LightSample sample_any_light(const Params *params, const Shading *shading
 // One direction towards the light that the tree has chosen; where the choice has turned elsewhere, to a sun
 // or to the environment, whose choices come first.
 INLINE LightSample sample_tree_light(const Params *params, const Shading *shading, const Emitters *emitters,
-                                     Vec3 position, Vec3 step, Uniform2 uv, float choice,
-                                     ChosenLight chosen) {
+                                     const Starts *starts, Uniform2 uv, float choice, ChosenLight chosen) {
     float chance = chosen.chance * params->tree_probability;
     LightSample result;
 #ifdef SHAPED_LIGHTS
@@ -298,11 +297,11 @@ INLINE LightSample sample_tree_light(const Params *params, const Shading *shadin
     uint sun = chosen_shaped_light(params, emitters, choice_among_shaped(params, choice));
     ShapedLight light = load_shaped_light(params, emitters, shaped.place | (sun & far_mask));
     light.probability *= far_mask ? 1.0f : chance;
-    result = sample_shape(light, position, step, uv);
+    result = sample_shape(light, starts, uv);
 #endif
 #ifdef TRIANGLE_LIGHTS
     TablePlace place = place_of_triangle(params, chosen.number);
-    LightSample triangle = sample_triangle_point(params, shading, emitters, position, step, uv, place.place);
+    LightSample triangle = sample_triangle_point(params, shading, emitters, starts, uv, place.place);
     triangle.pdf *= chance;
 #ifdef SHAPED_LIGHTS
     result = select_sample(place.mask != 0u, triangle, result);
@@ -334,17 +333,16 @@ INLINE uint is_changed_light(const Params *params, const Emitters *emitters, Cho
 
 #if defined(LIGHT_SAMPLING) && !defined(LIGHT_TREE)
 // One direction towards a light, chosen by power among triangles and the environment.
-// `step` is how far off the surface at `position` rays start, along its normal.
 INLINE LightSample sample_light(const Params *params, const Shading *shading, const Emitters *emitters,
-                                Vec3 position, Vec3 step, Uniform2 uv, float choice) {
+                                const Starts *starts, Uniform2 uv, float choice) {
 #if defined(SHAPED_LIGHTS)
-    return sample_any_light(params, shading, emitters, position, step, uv, choice);
+    return sample_any_light(params, shading, emitters, starts, uv, choice);
 #elif defined(ENVIRONMENT_IMAGE) && defined(TRIANGLE_LIGHTS)
     float p = params->environment_probability;
     int far = choice < p;
     LightSample a = sample_environment(params, emitters, uv);
     LightSample b =
-        sample_triangle_light(params, shading, emitters, position, step, uv, second_choice(params, choice));
+        sample_triangle_light(params, shading, emitters, starts, uv, second_choice(params, choice));
     LightSample result;
     result.direction = select(far, a.direction, b.direction);
     result.distance = far ? a.distance : b.distance;
@@ -354,7 +352,7 @@ INLINE LightSample sample_light(const Params *params, const Shading *shading, co
 #elif defined(ENVIRONMENT_IMAGE)
     return sample_environment(params, emitters, uv);
 #elif defined(TRIANGLE_LIGHTS)
-    return sample_triangle_light(params, shading, emitters, position, step, uv, choice);
+    return sample_triangle_light(params, shading, emitters, starts, uv, choice);
 #endif
 }
 #endif

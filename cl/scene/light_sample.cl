@@ -8,8 +8,13 @@ typedef struct {
     float pdf;     // of the direction, per solid angle; 0 where the sample failed
 } LightSample;
 
-// Where a ray from a surface to a point starts: a step off the surface, on the side where the point lies.
-INLINE Vec3 start_towards(Vec3 point, Vec3 position, Vec3 step) {
-    float side = dot(subtract(point, position), step) < 0.0f ? -1.0f : 1.0f;
-    return along(position, side, step);
+// Where rays start that leave a surface: steps off it, for points on that side of its face where `above` is,
+// and for those on the other side.
+typedef struct {
+    Vec3 position, above, below;
+} Starts;
+
+INLINE Vec3 start_towards(Vec3 point, const Starts *starts) {
+    int is_below = dot(subtract(point, starts->position), starts->above) < 0.0f;
+    return add(starts->position, select(is_below, starts->below, starts->above));
 }

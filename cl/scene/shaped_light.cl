@@ -172,10 +172,10 @@ INLINE float shaped_light_pdf(const ShapedLight *light, Vec3 to_center, Vec3 dir
 #define LIGHT_AHEAD 1e-6f
 
 // `uv` selects the direction. Where only light sampling can find the light, its weight is made 1 by SURE_PDF.
-INLINE LightSample sample_shape(ShapedLight light, Vec3 position, Vec3 step, Uniform2 uv) {
+INLINE LightSample sample_shape(ShapedLight light, const Starts *starts, Uniform2 uv) {
     int sun = has_flag(&light, SHAPED_SUN), ball = has_flag(&light, SHAPED_BALL);
     int point = has_flag(&light, SHAPED_POINT);
-    Vec3 origin = start_towards(light.center, position, step);
+    Vec3 origin = start_towards(light.center, starts);
     Vec3 to_center = subtract(light.center, origin);
     float squared = dot(to_center, to_center), length = SQRT(squared);
     Vec3 center_direction = select(sun, light.z, scale(1.0f / MAX(length, 1e-30f), to_center));
@@ -224,10 +224,10 @@ INLINE LightSample sample_shape(ShapedLight light, Vec3 position, Vec3 step, Uni
 }
 
 // `choice` selects the light, `uv` the direction.
-INLINE LightSample sample_shaped_light(const Params *params, const Emitters *emitters, Vec3 position,
-                                       Vec3 step, Uniform2 uv, float choice) {
+INLINE LightSample sample_shaped_light(const Params *params, const Emitters *emitters, const Starts *starts,
+                                       Uniform2 uv, float choice) {
     ShapedLight light = load_shaped_light(params, emitters, chosen_shaped_light(params, emitters, choice));
-    return sample_shape(light, position, step, uv);
+    return sample_shape(light, starts, uv);
 }
 
 // Whether rays of which `bsdf_pdf` is the density can meet the light: 0 is that of camera rays, and of those

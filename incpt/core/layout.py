@@ -139,7 +139,9 @@ class SurfacePlane(IntEnum):
     on a light. WEIGHT_B and WEIGHT_C are the barycentric weights of the second and third corner, for what
     meshes have at corners; only scenes with textures have them. TURN is the angle, in turns, from the frame
     that is made of the shading normal alone to the direction along which anisotropic reflections are
-    stretched; COAT_X to COAT_Z the normal of the clearcoat, where that is not the shading normal.
+    stretched; COAT_X to COAT_Z the normal of the clearcoat, where that is not the shading normal. RISE is how
+    far the surface that smooth normals pretend stands above the face, along the geometric normal, where that
+    is on the side of the ray, else 0: rays that are scattered below the plane of the face start there.
     """
 
     GEOMETRIC_X = 0
@@ -162,6 +164,7 @@ class SurfacePlane(IntEnum):
     COAT_X = 17
     COAT_Y = 18
     COAT_Z = 19
+    RISE = 20
 
 
 class PathPlane(IntEnum):

@@ -58,7 +58,8 @@ def sampled(light: Light, u: Array, v: Array) -> tuple[Array, Array, Array]:
     Uniform2 uv;
     uv.u = u[i];
     uv.v = v[i];
-    LightSample s = sample_light(&params, 0, &emitters, position, vec3(0.0f, 0.0f, 0.0f), uv, 0.5f);
+    const Starts starts = {position, vec3(0.0f, 0.0f, 0.0f), vec3(0.0f, 0.0f, 0.0f)};
+    LightSample s = sample_light(&params, 0, &emitters, &starts, uv, 0.5f);
     x[i] = s.direction.x;
     y[i] = s.direction.y;
     z[i] = s.direction.z;
