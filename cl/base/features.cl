@@ -14,13 +14,13 @@
 #define HAS_TRAIT(trait) (TRAITS >> TRAIT_##trait & 1u)
 
 // Whether a clearcoat has a normal that is not that of its base.
-#if HAS_TRAIT(CLEARCOAT) && (TEXTURED(NORMAL) || TEXTURED(CLEARCOAT_NORMAL))
+#if HAS_TRAIT(CLEARCOAT) && (TEXTURED(NORMAL) || TEXTURED(BUMP) || TEXTURED(CLEARCOAT_NORMAL))
 #define COAT_NORMALS
 #define COAT_NORMAL(surface) (surface)->coat
 #else
 #define COAT_NORMAL(surface) (surface)->shading
 #endif
 // Whether surfaces have more to be set up than a hit tells.
-#if TEXTURED(NORMAL) || defined(COAT_NORMALS) || HAS_TRAIT(ANISOTROPY)
+#if TEXTURED(NORMAL) || TEXTURED(BUMP) || defined(COAT_NORMALS) || HAS_TRAIT(ANISOTROPY)
 #define TANGENTS
 #endif

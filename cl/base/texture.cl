@@ -71,18 +71,28 @@ INLINE Texel texel_between(Texel a, Texel b, float t) {
     return texel;
 }
 
-// A texture at a point of a surface; texture 0 is white.
-INLINE Texel sample_texture(const Shading *shading, uint number, const Uvs *uvs) {
-    __global const Texture *texture = shading->textures + number;
+// Where a point of a surface lies in the image of a texture, in images.
+typedef struct {
+    float x, y;
+} ImagePlace;
+
+INLINE ImagePlace place_in_image(__global const Texture *texture, const Uvs *uvs) {
     __global const float *m = texture->matrix;
-    uint flags = texture->flags;
     float u = texture->uv_set ? uvs->u1 : uvs->u0, v = texture->uv_set ? uvs->v1 : uvs->v0;
+    ImagePlace place;
+    place.x = m[0] * u + m[1] * v + m[2];
+    place.y = m[3] * u + m[4] * v + m[5];
+    return place;
+}
+
+INLINE Texel sample_image(const Shading *shading, __global const Texture *texture, ImagePlace place) {
+    uint flags = texture->flags;
     uint clamps_u = flags & TEXTURE_CLAMP_U, mirrors_u = flags & TEXTURE_MIRROR_U;
     uint clamps_v = flags & TEXTURE_CLAMP_V, mirrors_v = flags & TEXTURE_MIRROR_V;
     float half_pixel = flags & TEXTURE_NEAREST ? 0.0f : 0.5f;
     int width = (int)texture->width, height = (int)texture->height;
-    float x = wrapped(m[0] * u + m[1] * v + m[2], clamps_u, mirrors_u) * (float)width - half_pixel;
-    float y = wrapped(m[3] * u + m[4] * v + m[5], clamps_v, mirrors_v) * (float)height - half_pixel;
+    float x = wrapped(place.x, clamps_u, mirrors_u) * (float)width - half_pixel;
+    float y = wrapped(place.y, clamps_v, mirrors_v) * (float)height - half_pixel;
     float left = FLOOR(x), top = FLOOR(y);
     float tx = flags & TEXTURE_NEAREST ? 0.0f : x - left, ty = flags & TEXTURE_NEAREST ? 0.0f : y - top;
     uint x0 = wrapped_index((int)left, width, clamps_u, mirrors_u);
@@ -92,6 +102,33 @@ INLINE Texel sample_texture(const Shading *shading, uint number, const Uvs *uvs)
     Texel upper = texel_between(texel_at(shading, texture, x0, y0), texel_at(shading, texture, x1, y0), tx);
     Texel lower = texel_between(texel_at(shading, texture, x0, y1), texel_at(shading, texture, x1, y1), tx);
     return texel_between(upper, lower, ty);
+}
+
+// A texture at a point of a surface; texture 0 is white.
+INLINE Texel sample_texture(const Shading *shading, uint number, const Uvs *uvs) {
+    __global const Texture *texture = shading->textures + number;
+    return sample_image(shading, texture, place_in_image(texture, uvs));
+}
+
+// How red grows in a texture along u and along v: the differences over a pixel, which are continuous where
+// the slopes of what is interpolated are not.
+INLINE Uniform2 texture_slope(const Shading *shading, uint number, const Uvs *uvs) {
+    __global const Texture *texture = shading->textures + number;
+    __global const float *m = texture->matrix;
+    float width = (float)texture->width, height = (float)texture->height;
+    ImagePlace left = place_in_image(texture, uvs), right = left, above = left, below = left;
+    left.x -= 0.5f / width;
+    right.x += 0.5f / width;
+    above.y -= 0.5f / height;
+    below.y += 0.5f / height;
+    float along_x = width * (sample_image(shading, texture, right).color.x -
+                             sample_image(shading, texture, left).color.x);
+    float along_y = height * (sample_image(shading, texture, below).color.x -
+                              sample_image(shading, texture, above).color.x);
+    Uniform2 slope;
+    slope.u = along_x * m[0] + along_y * m[3];
+    slope.v = along_x * m[1] + along_y * m[4];
+    return slope;
 }
 
 // The colour of a texture that may be above 1, as that of emission, but not below 0: images of floats may

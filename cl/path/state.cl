@@ -194,7 +194,7 @@ INLINE void store_surface(const State *state, uint path, const Surface *s) {
 // Stores what set_tangents sets up.
 INLINE void store_tangents(const State *state, uint path, const Surface *s) {
     uint stride = STRIDE(state);
-#if TEXTURED(NORMAL)
+#if TEXTURED(NORMAL) || TEXTURED(BUMP)
     store3(state->surfaces + SURFACE_SHADING_X * stride, stride, path, s->shading);
 #endif
 #if HAS_TRAIT(ANISOTROPY)

@@ -74,7 +74,8 @@ INLINE SurfaceMaterial surface_material(const Shading *shading, const Surface *s
     m.diffuse_transmission_color =
         mul(m.diffuse_transmission_color, sample_texture(shading, passed, &uvs).color);
 #endif
-#if TEXTURES & ~(1u << SLOT_OF_NORMAL | 1u << SLOT_OF_EMISSION | 1u << SLOT_OF_CLEARCOAT_NORMAL)
+#if TEXTURES &                                                                                               \
+    ~(1u << SLOT_OF_NORMAL | 1u << SLOT_OF_EMISSION | 1u << SLOT_OF_CLEARCOAT_NORMAL | 1u << SLOT_OF_BUMP)
     // Images of floats may hold anything.
     m.base_color = shares(m.base_color);
     m.roughness = CLAMP(m.roughness, 0.0f, 1.0f);

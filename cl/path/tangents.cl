@@ -2,8 +2,9 @@
 
 // What directions along a surface are for: normal maps, and reflections that are stretched. A surface whose
 // material has a normal map gets the normal that the map tells in the frame of the tangent, the way up in the
-// image, and the interpolated normal. Tangents are those of MikkTSpace, which interpolates them as they are
-// and keeps them as long as they then are. A clearcoat has its own map, or the interpolated normal.
+// image, and the interpolated normal; a height map adds its slope. Tangents are those of MikkTSpace, which
+// interpolates them as they are and keeps them as long as they then are. A clearcoat has its own map, or the
+// interpolated normal.
 
 #ifdef TANGENTS
 // A direction along a surface, from object space to world space: along with what lies on the surface.
@@ -49,6 +50,40 @@ INLINE Vec3 mapped_normal(const Shading *shading, uint number, float amount, con
     return select((number != 0u) & frame->exists, normalize(mapped), normal);
 }
 
+#if TEXTURED(BUMP)
+// No slope of a height map is steeper.
+#define STEEPEST_BUMP 1e6f
+
+// How the heights of a map grow along the surface, in world space (M. Mikkelsen, Surface Gradient-Based Bump
+// Mapping Framework, JCGT 9(3), 2020). Gradients go to world space as normals do.
+INLINE Vec3 height_gradient(__global const Object *objects, const Shading *shading, const Surface *surface,
+                            uint number, float metres, const Uvs *uvs, Vec3 normal) {
+    __global const Attributes *attributes = shading->attributes + surface->object;
+    uint has = attributes->has_gradient;
+    __global const float *g =
+        shading->gradients + attributes->first_gradient + 6u * (size_t)(has * surface->face);
+    Uniform2 slope = texture_slope(shading, number, uvs);
+    float u = metres * slope.u, v = metres * slope.v;
+    Vec3 grown = vec3(u * g[0] + v * g[3], u * g[1] + v * g[4], u * g[2] + v * g[5]);
+    __global const float *m = objects[surface->object].object_from_world;
+    Vec3 gradient = vec3(m[0] * grown.x + m[4] * grown.y + m[8] * grown.z,
+                         m[1] * grown.x + m[5] * grown.y + m[9] * grown.z,
+                         m[2] * grown.x + m[6] * grown.y + m[10] * grown.z);
+    gradient = subtract(gradient, scale(dot(gradient, normal), normal));
+    gradient.x = CLAMP(gradient.x, -STEEPEST_BUMP, STEEPEST_BUMP);
+    gradient.y = CLAMP(gradient.y, -STEEPEST_BUMP, STEEPEST_BUMP);
+    gradient.z = CLAMP(gradient.z, -STEEPEST_BUMP, STEEPEST_BUMP);
+    return select((number != 0u) & (has != 0u), gradient, vec3(0.0f, 0.0f, 0.0f));
+}
+
+// A normal with the slope of a height map beside its own, over the surface with the normal `smooth`.
+INLINE Vec3 bumped_normal(Vec3 normal, Vec3 smooth, Vec3 gradient) {
+    float upright = MAX(dot(normal, smooth), 1e-3f);
+    Vec3 bumped = normalize(subtract(scale(1.0f / upright, normal), gradient));
+    return select(dot(gradient, gradient) > 0.0f, bumped, normal);
+}
+#endif
+
 #if HAS_TRAIT(ANISOTROPY)
 // The angle, in turns, from the tangent of `frame_of` to the direction along which reflections are stretched.
 INLINE float stretched_turns(const Shading *shading, __global const Material *material, const Uvs *uvs,
@@ -85,6 +120,11 @@ INLINE void set_tangents(__global const Object *objects, const Shading *shading,
 #if TEXTURED(NORMAL)
     surface->shading =
         mapped_normal(shading, textures[SLOT_OF_NORMAL], material->normal_scale, &uvs, &frame, smooth);
+#endif
+#if TEXTURED(BUMP)
+    Vec3 gradient = height_gradient(objects, shading, surface, textures[SLOT_OF_BUMP], material->bump_scale,
+                                    &uvs, smooth);
+    surface->shading = bumped_normal(surface->shading, smooth, gradient);
 #endif
 #ifdef COAT_NORMALS
     surface->coat = smooth;

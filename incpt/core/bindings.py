@@ -123,6 +123,7 @@ SHADING = Group(
         _table("uvs", "float", "texture coordinates at the corners of faces, mesh by mesh"),
         _table("colors", "float", "colours at the corners of faces, mesh by mesh"),
         _table("tangents", "float", "tangents and their sides at the corners of faces, mesh by mesh"),
+        _table("gradients", "float", "of faces, how texture coordinates grow along them, mesh by mesh"),
         _table(
             "first_share", "uint", "of every object, where the shares of its faces begin; 0: there are none"
         ),

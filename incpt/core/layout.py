@@ -609,6 +609,7 @@ class TextureSlot(IntEnum):
     IRIDESCENCE_THICKNESS = 14
     DIFFUSE_TRANSMISSION = 15
     DIFFUSE_TRANSMISSION_COLOR = 16
+    BUMP = 17
 
 
 class TextureFlag(IntFlag):
@@ -794,6 +795,7 @@ MATERIAL = _packed(
         ("diffuse_transmission", np.float32),
         ("diffuse_transmission_color", np.float32, (3,)),
         ("dispersion", np.float32),
+        ("bump_scale", np.float32),  # metres of 1 in its height map
         ("textures", np.uint32, (len(TextureSlot),)),  # rows of TEXTURE; 0 is white
     ]
 )
@@ -820,6 +822,9 @@ ATTRIBUTES = _packed(
         ("has_color", np.uint32),
         ("first_tangent", np.uint32),
         ("has_tangent", np.uint32),
+        # And on its faces, for height maps.
+        ("first_gradient", np.uint32),
+        ("has_gradient", np.uint32),
     ]
 )
 

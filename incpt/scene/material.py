@@ -21,6 +21,8 @@ THICKEST_FILM = 100_000.0
 """Of `iridescence_thickness`, nm; from a few thousand on a film has no colours any more."""
 LARGEST_DISPERSION = 100.0
 """Of `dispersion`; diamond has 0.36, and from 20 on it is far beyond what there is."""
+HIGHEST_BUMP = 1000.0
+"""Of `bump_scale`, metres; below 0 bumps are dents."""
 _SHARES = (
     "metallic", "roughness", "specular", "transmission", "alpha", "clearcoat", "clearcoat_roughness",
     "sheen_roughness", "anisotropy", "iridescence", "diffuse_transmission",
@@ -65,7 +67,8 @@ class Material:
     `iridescence_thickness`.
     `normal_texture` bends the shading normal: red and green, from 0 to 1, are its deflections along the
     tangent and upwards in the image, from -1 to 1 and times `normal_scale`; `clearcoat_normal_texture` that
-    of the clearcoat, which is smooth without it.
+    of the clearcoat, which is smooth without it. `bump_texture` bends it too, beside a normal map: red, times
+    `bump_scale`, is a height over the surface in metres of the world. Bytes are coarse steps for that.
     """
 
     base_color: Vector = (0.8, 0.8, 0.8)
@@ -98,6 +101,7 @@ class Material:
     diffuse_transmission_color: Vector = (1.0, 1.0, 1.0)
     thin_walled: bool = False
     dispersion: float = 0.0
+    bump_scale: float = 0.01
     unlit: bool = False
     base_color_texture: Texture | None = None
     metallic_roughness_texture: Texture | None = None
@@ -116,6 +120,7 @@ class Material:
     iridescence_thickness_texture: Texture | None = None
     diffuse_transmission_texture: Texture | None = None
     diffuse_transmission_color_texture: Texture | None = None
+    bump_texture: Texture | None = None
 
     def __post_init__(self) -> None:
         set_vector(self, "base_color", low=0.0, high=1.0)
@@ -139,6 +144,7 @@ class Material:
         for name in ("iridescence_thickness", "iridescence_least_thickness"):
             set_number(self, name, 0.0, THICKEST_FILM)
         set_number(self, "dispersion", 0.0, LARGEST_DISPERSION)
+        set_number(self, "bump_scale", -HIGHEST_BUMP, HIGHEST_BUMP)
         for slot in TextureSlot:
             name = texture_name(slot)
             require(name, getattr(self, name), (Texture, NoneType), "a Texture")
@@ -187,7 +193,7 @@ class Material:
 
 _SEEN_BY_WALLS = (
     TextureSlot.BASE_COLOR, TextureSlot.METALLIC_ROUGHNESS, TextureSlot.NORMAL, TextureSlot.TRANSMISSION,
-    TextureSlot.SPECULAR, TextureSlot.SPECULAR_COLOR,
+    TextureSlot.SPECULAR, TextureSlot.SPECULAR_COLOR, TextureSlot.BUMP,
 )  # fmt: skip
 """Slots that make what a smooth wall lets through differ from point to point."""
 _TEXTURE_NAMES = {slot: f"{slot.name.lower()}_texture" for slot in TextureSlot}

@@ -1,4 +1,4 @@
-"""Tangents at the corners of a mesh, from its texture coordinates.
+"""How texture coordinates lie on a mesh: tangents at its corners, and gradients on its faces.
 
 Normal maps are made for tangents that are computed in one way, and look wrong with others: that of MikkTSpace
 (M. Mikkelsen, Simulation of Wrinkled Surfaces Revisited, 2008), which glTF asks for. Corners share a tangent
@@ -21,6 +21,8 @@ Array = npt.NDArray[np.float64]
 
 _LEAST = 1e-30
 """Lengths below it have no direction."""
+_STEEPEST = 1e12
+"""Of gradients, so that kernels can calculate with those of slivers."""
 _POLE = 1e-3
 """Sines of the angle to the y axis below it have no parallel: beside it rounding would tell the direction."""
 
@@ -49,6 +51,23 @@ def corner_tangents(mesh: Mesh, uv_set: int = 0) -> npt.NDArray[np.float32]:
     usable = length > _LEAST
     unit: Array = np.where(usable, tangents / np.where(usable, length, 1), _parallels(normals))
     return _joined(unit, side)
+
+
+def uv_gradients(mesh: Mesh, uv_set: int = 0) -> npt.NDArray[np.float32]:
+    """(F, 2, 3) the gradients of u and of v along each face, per metre, object space. 0 where the mesh has no
+    such texture coordinates, and on faces without an area."""
+    if uv_set >= len(mesh.uvs):
+        return np.zeros((len(mesh.faces), 2, 3), np.float32)
+    corners, uvs = mesh.vertices[mesh.faces].astype(np.float64), mesh.uvs[uv_set].astype(np.float64)
+    ab, ac = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(ab, ac)
+    squared = np.sum(normal * normal, axis=1, keepdims=True)
+    # Vectors along the face of which one grows along ab alone, and the other along ac.
+    along = np.stack([np.cross(ac, normal), np.cross(normal, ab)], axis=1)
+    along = along / np.where(squared > 0, squared, np.inf)[:, None]
+    gradients: Array = np.einsum("fed,fec->fcd", along, uvs[:, 1:] - uvs[:, :1])
+    bounded: npt.NDArray[np.float32] = np.clip(gradients, -_STEEPEST, _STEEPEST).astype(np.float32)
+    return bounded
 
 
 def _normals(mesh: Mesh, corners: Array) -> Array:

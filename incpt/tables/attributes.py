@@ -1,5 +1,6 @@
 """What meshes have at the corners of their faces, as kernels find it for each object: texture coordinates,
-colours, tangents. They lie in the pool of geometry; scenes without textures don't ask for them."""
+colours, tangents; and on faces, gradients of texture coordinates. They lie in the pool of geometry; scenes
+without textures don't ask for them."""
 
 from __future__ import annotations
 
@@ -23,7 +24,10 @@ class AttributeTable:
     ) -> None:
         self._pool, self._meshes = pool, meshes
         self._objects = scene.objects if is_used else ()
-        self._tangent_sets = _tangent_sets(scene.materials)
+        self._tangent_sets, self._gradient_sets = (
+            _tangent_sets(scene.materials),
+            _gradient_sets(scene.materials),
+        )
         self.has_colors = any(mesh.colors is not None for mesh in meshes)
         self._buffer = self._uploaded()
 
@@ -38,14 +42,17 @@ class AttributeTable:
         """One row at least, which kernels read for a ray that meets nothing."""
         self._packings = self._pool.packings
         rows = np.zeros(max(len(self._objects), 1), layout.ATTRIBUTES)
-        by_kind: dict[tuple[Mesh, int | None], int] = {}
+        by_kind: dict[tuple[Mesh, int | None, int | None], int] = {}
         kinds = [
-            by_kind.setdefault((obj.mesh, self._tangent_sets.get(obj.material)), len(by_kind))
+            by_kind.setdefault(
+                (obj.mesh, self._tangent_sets.get(obj.material), self._gradient_sets.get(obj.material)),
+                len(by_kind),
+            )
             for obj in self._objects
         ]
         described = np.zeros(len(by_kind), layout.ATTRIBUTES)
-        for row, (mesh, tangent_set) in zip(described, by_kind, strict=True):
-            _describe(row, self._meshes[mesh], tangent_set)
+        for row, (mesh, tangent_set, gradient_set) in zip(described, by_kind, strict=True):
+            _describe(row, self._meshes[mesh], tangent_set, gradient_set)
         if kinds:
             rows[:] = described[kinds]
         return self._pool.device.upload(rows)
@@ -55,8 +62,8 @@ def attribute_table(
     pool: GeometryPool, scene: Scene, meshes: Mapping[Mesh, PooledMesh], has_textures: bool
 ) -> AttributeTable:
     """Of a scene whose meshes are held. What they have at their corners is uploaded where `has_textures`, or
-    some have colours, and tangents are computed where normal maps or stretched reflections need them. Raises
-    DeviceError where there is no room for it."""
+    some have colours; tangents are computed where normal maps or stretched reflections need them, and
+    gradients where height maps do. Raises DeviceError where there is no room for it."""
     is_used = (
         has_textures
         or any(mesh.colors is not None for mesh in meshes)
@@ -68,15 +75,19 @@ def attribute_table(
 
 
 def _needed(scene: Scene, meshes: Iterable[Mesh]) -> dict[tuple[Mesh, str], None]:
-    """What meshes have at their corners, and the tangents of those whose materials need them."""
+    """What meshes have at their corners, and tangents and gradients of those whose materials need them."""
     needed: dict[tuple[Mesh, str], None] = {}
     for mesh in meshes:
         needed |= dict.fromkeys((mesh, f"uvs {number}") for number in range(len(mesh.uvs)))
         if mesh.colors is not None:
             needed[mesh, "colors"] = None
-    sets = _tangent_sets(scene.materials)
-    mapped = (obj for obj in scene.objects if obj.material in sets)
-    return needed | dict.fromkeys((obj.mesh, f"tangents {sets[obj.material]}") for obj in mapped)
+    for kind, sets in (
+        ("tangents", _tangent_sets(scene.materials)),
+        ("gradients", _gradient_sets(scene.materials)),
+    ):
+        mapped = (obj for obj in scene.objects if obj.material in sets)
+        needed |= dict.fromkeys((obj.mesh, f"{kind} {sets[obj.material]}") for obj in mapped)
+    return needed
 
 
 def _tangent_sets(materials: Mapping[str, Material]) -> dict[str, int]:
@@ -91,9 +102,20 @@ def _tangent_sets(materials: Mapping[str, Material]) -> dict[str, int]:
     return found
 
 
-def _describe(row: np.void, mesh: PooledMesh, tangent_set: int | None) -> None:
+def _gradient_sets(materials: Mapping[str, Material]) -> dict[str, int]:
+    """The set of texture coordinates of the height map of each material that has one."""
+    return {
+        name: material.bump_texture.uv_set
+        for name, material in materials.items()
+        if material.bump_texture is not None
+    }
+
+
+def _describe(row: np.void, mesh: PooledMesh, tangent_set: int | None, gradient_set: int | None) -> None:
     for number in range(2):
         row["first_uv"][number], row["has_uv"][number] = mesh.place_of(f"uvs {number}")
     row["first_color"], row["has_color"] = mesh.place_of("colors")
     if tangent_set is not None:
         row["first_tangent"], row["has_tangent"] = mesh.place_of(f"tangents {tangent_set}")
+    if gradient_set is not None:
+        row["first_gradient"], row["has_gradient"] = mesh.place_of(f"gradients {gradient_set}")

@@ -19,15 +19,16 @@ from incpt.accel import bvh, quads
 from incpt.core import layout
 from incpt.device.device import Device
 from incpt.scene.mesh import Mesh
-from incpt.scene.tangents import corner_tangents
+from incpt.scene.tangents import corner_tangents, uv_gradients
 from incpt.tables.range_buffer import Range, RangeBuffer
 
 _MOST_NODES = layout.NODE_LEAF
 _MOST_PACKS = layout.NODE_PACK // layout.BVH_WIDTH
 """The place of a hit is the place of its pack times BVH_WIDTH, and NODE_PACK is a flag above it."""
 _MOST_NORMALS = layout.NO_INDEX
-_CORNERS = {"uvs": "texture coordinates", "colors": "colours of corners", "tangents": "tangents"}
-"""Buffers of what meshes have at their corners beside normals."""
+_CORNERS = {"uvs": "texture coordinates", "colors": "colours of corners", "tangents": "tangents",
+            "gradients": "gradients of texture coordinates"}  # fmt: skip
+"""Buffers of what meshes have at their corners beside normals, or on their faces."""
 
 
 class BuiltMesh:
@@ -52,7 +53,8 @@ class PooledMesh:
         self._nodes, self._packs, self._normals = nodes, packs, normals
         self.corners: dict[str, Range] = {}
         """What it has at its corners beside normals, as far as some scene needs it: "uvs 0", "uvs 1",
-        "colors", and the tangents that go by a set of texture coordinates, "tangents 0" and "tangents 1"."""
+        "colors", and what goes by a set of texture coordinates: "tangents 0", "gradients 0" and those of set
+        1."""
 
     @property
     def place(self) -> tuple[int, int, int, int]:
@@ -100,9 +102,9 @@ class GeometryPool:
         return sum(ranges.packings for ranges in self._buffers.values())
 
     def buffer(self, name: str) -> cl.Buffer:
-        """The buffer of all nodes, packs, normals, uvs, colors or tangents. It may be another one after the
-        next `hold` or `shrink`, so that every launch asks for it. One that was replaced keeps what it had,
-        and nothing is written to it any more: launches with buffers that were asked for together are
+        """The buffer of all nodes, packs, normals, uvs, colors, tangents or gradients. It may be another one
+        after the next `hold` or `shrink`, so that every launch asks for it. One that was replaced keeps what
+        it had, and nothing is written to it any more: launches with buffers that were asked for together are
         right."""
         return self._buffers[name].buffer
 
@@ -180,6 +182,8 @@ def _at_corners(mesh: Mesh, name: str) -> npt.NDArray[np.float32]:
     if kind == "colors":
         assert mesh.colors is not None
         return mesh.colors
+    if kind == "gradients":
+        return uv_gradients(mesh, int(number))
     return mesh.uvs[int(number)] if kind == "uvs" else corner_tangents(mesh, int(number))
 
 

@@ -21,6 +21,7 @@ _COPIED = (
     "clearcoat_roughness", "clearcoat_normal_scale", "sheen_color", "sheen_roughness", "anisotropy",
     "anisotropy_rotation", "iridescence", "iridescence_ior", "iridescence_thickness",
     "iridescence_least_thickness", "diffuse_transmission", "diffuse_transmission_color", "dispersion",
+    "bump_scale",
 )  # fmt: skip
 """What rows take over from materials as it is."""
 

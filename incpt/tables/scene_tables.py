@@ -177,7 +177,8 @@ class SceneTables:
 
     @cached_property
     def _is_flat(self) -> bool:
-        bends = self.textures.has(TextureSlot.NORMAL) or self.textures.has(TextureSlot.CLEARCOAT_NORMAL)
+        bend = (TextureSlot.NORMAL, TextureSlot.CLEARCOAT_NORMAL, TextureSlot.BUMP)
+        bends = any(self.textures.has(slot) for slot in bend)
         return not bends and all(mesh.normals is None for mesh in self.meshes)
 
     @property

@@ -499,6 +499,7 @@ MATERIAL_VALUES: dict[str, st.SearchStrategy[Any]] = {
     "clearcoat": fractions,
     "clearcoat_roughness": fractions,
     "clearcoat_normal_scale": st.floats(-100, 100),
+    "bump_scale": st.floats(-1000, 1000),
     "sheen_color": st.tuples(fractions, fractions, fractions),
     "sheen_roughness": fractions,
     "anisotropy": fractions,

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pytest
 from support.kernels import device
 from support.law import assert_edits_converge
-from support.pairs import check, traced_pairs
+from support.pairs import check, session_of, traced_pairs
 from support.parameters import TEXTURES
 from support.renders import assert_same_mean, pixels, render, repeat
 from support.small_scenes import mixed_scene, small_settings
@@ -102,6 +102,10 @@ ALIKE: dict[str, tuple[Material, Material]] = {
     ),
     "flat normals": (
         Material((0.6, 0.5, 0.4), normal_texture=uniform(0.5, 0.5, 1.0)),
+        Material((0.6, 0.5, 0.4)),
+    ),
+    "flat heights": (
+        Material((0.6, 0.5, 0.4), bump_texture=uniform(0.7), bump_scale=9),
         Material((0.6, 0.5, 0.4)),
     ),
     "emission": (
@@ -286,6 +290,75 @@ def test_the_scale_of_a_normal_map_is_that_of_its_slope() -> None:
         np.testing.assert_allclose(lit / flat, cosine * 2**0.5, rtol=0.03)
 
 
+# Height maps.
+
+
+def hills(size: int, waves: int = 2) -> Array:
+    """(size, size) heights from 0 to 1 that repeat."""
+    x = (np.arange(size) + 0.5) / size * 2 * np.pi * waves
+    return np.asarray(0.5 + 0.25 * (np.sin(x)[None] + np.cos(x)[:, None]))
+
+
+def normal_map_of(heights: Array, metres: float) -> Bitmap:
+    """Of a height map over a square metre: from the differences of neighbours."""
+    size = len(heights)
+    along_u = (np.roll(heights, -1, 1) - np.roll(heights, 1, 1)) * size / 2 * metres
+    along_v = (np.roll(heights, -1, 0) - np.roll(heights, 1, 0)) * size / 2 * metres
+    normals = np.stack([-along_u, along_v, np.ones_like(heights)], axis=2)
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    return Bitmap((normals + 1) / 2)
+
+
+def seen_normals(
+    material: Material, mesh: Mesh, in_blocks: bool = True, size: float = 1.0, **placed: Any
+) -> Array:
+    """(44, 44, 3) shading normals of most of a thing of that size, seen from above."""
+    camera = Camera((0, 5, 0), (0, 0, 0), (0, 0, -1), projection="orthographic", ortho_height=0.9 * size)
+    scene = Scene(camera, Environment(), {"m": material}, (Object("o", mesh, "m", **placed),))
+    settings = small_settings(size=(44, 44), aovs=True)
+    session = session_of(device(), replace(scene, settings=settings), in_blocks, 16)
+    session.render(16)
+    return session.pass_image("normal")
+
+
+@pytest.mark.parametrize("in_blocks", [True, False])
+def test_a_height_map_is_the_normal_map_of_its_slopes(in_blocks: bool) -> None:
+    """Of a plane as it is, of a mirrored and of a turned one, and of a small one."""
+    metres, heights = 0.1, hills(64)
+    bumped = Material(bump_texture=Texture(Bitmap(heights)), bump_scale=metres)
+    mapped = Material(normal_texture=Texture(normal_map_of(heights, metres)))
+    plane = shape("plane")
+    for placed in ({}, {"scale": (-1, 1, 1)}, {"rotation": (0, 30, 0)}):
+        images = [seen_normals(material, plane, in_blocks, **placed) for material in (bumped, mapped)]
+        assert np.abs(images[0][..., [0, 2]]).max() > 0.25
+        np.testing.assert_allclose(*images, atol=0.012)
+    # Slopes are of metres in the world.
+    small = seen_normals(replace(bumped, bump_scale=metres / 10), plane, in_blocks, 0.1, scale=(0.1, 1, 0.1))
+    whole = seen_normals(bumped, plane, in_blocks)
+    np.testing.assert_allclose(small, whole, atol=1e-3)
+
+
+def test_a_sine_of_heights_has_the_normals_of_its_derivative() -> None:
+    """On a turned plane whose texture is scaled, and beside a normal map that leans."""
+    waves, metres, size = 2, 0.03, 128
+    x = (np.arange(size) + 0.5) / size
+    texture = Texture(Bitmap(np.tile(np.sin(2 * np.pi * x) / 2 + 0.5, (4, 1))), scale=(waves, 1))
+    image = seen_normals(Material(bump_texture=texture, bump_scale=metres), shape("plane"))
+    place = (np.arange(44) + 0.5 - 22) / 44 * 0.9 + 0.5
+    slope = metres / 2 * 2 * np.pi * waves * np.cos(2 * np.pi * waves * place)
+    expected = np.stack([-slope, np.ones(44), np.zeros(44)], axis=1)
+    expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+    np.testing.assert_allclose(image, np.broadcast_to(expected, image.shape), atol=0.01)
+    lean = np.array([0.8, 0, 1]) / np.hypot(0.8, 1)
+    both = Material(
+        bump_texture=texture, bump_scale=metres, normal_texture=uniform(*((lean + 1) / 2).tolist())
+    )
+    expected = np.stack([0.8 - slope, np.ones(44), np.zeros(44)], axis=1)
+    expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+    image = seen_normals(both, shape("plane"))
+    np.testing.assert_allclose(image, np.broadcast_to(expected, image.shape), atol=0.01)
+
+
 # Textures of emission.
 
 
@@ -365,6 +438,7 @@ TEXTURE_EDITS: dict[str, Callable[[Scene], Scene]] = {
     "take away": lambda s: s.with_material("red", base_color_texture=None),
     "bumps": lambda s: s.with_material("red", normal_texture=Texture(bumps())),
     "flatten": lambda s: s.with_material("floor", normal_scale=0.1),
+    "rough": lambda s: s.with_material("red", bump_texture=Texture(Bitmap(hills(16))), bump_scale=0.2),
     "tile": lambda s: s.with_material("grey", emission_texture=Texture(checker(0, 255), scale=(2, 2))),
     "no glow": lambda s: s.with_material("grey", emission_texture=None),
     "glow": lambda s: s.with_material("red", emission=(2, 2, 2), emission_texture=Texture(checker(0, 255))),

@@ -23,7 +23,10 @@ DERIVED = {
 def test_every_parameter_is_checked(name: str, value: Any) -> None:
     if value is None and name in TEXTURES:
         return  # no texture
-    if name in ("normal_scale", "clearcoat_normal_scale", "anisotropy_rotation") and value == -1.0:
+    if (
+        name in ("normal_scale", "clearcoat_normal_scale", "bump_scale", "anisotropy_rotation")
+        and value == -1.0
+    ):
         return  # dents for bumps, and angles
     with pytest.raises(InputError, match=f"^{name}: "):
         Material(**{name: value})

@@ -12,7 +12,7 @@ import pytest
 from incpt.core.errors import InputError
 from incpt.scene.mesh import Mesh
 from incpt.scene.shapes import SHAPES, shape
-from incpt.scene.tangents import corner_tangents
+from incpt.scene.tangents import corner_tangents, uv_gradients
 from incpt.scene.texture import BITMAP_MAX_SIZE, Bitmap, Texture
 
 GREY = Bitmap(np.full((2, 3, 3), 128, np.uint8))
@@ -187,3 +187,25 @@ def test_tangents_that_a_mesh_brings_are_taken() -> None:
     own = np.zeros((12, 3, 4), np.float32)
     own[..., 2] = own[..., 3] = 1
     np.testing.assert_array_equal(corner_tangents(replace(shape("cube"), tangents=own)), own)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_gradients_tell_how_texture_coordinates_grow_along_faces(name: str) -> None:
+    mesh = shape(name)
+    corners, uv = mesh.vertices[mesh.faces].astype(np.float64), mesh.uvs[0]
+    gradients = uv_gradients(mesh).astype(np.float64)
+    for edge in (1, 2):
+        grown = np.einsum("fcd,fd->fc", gradients, corners[:, edge] - corners[:, 0])
+        np.testing.assert_allclose(grown, uv[:, edge] - uv[:, 0], atol=1e-5)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    np.testing.assert_allclose(np.einsum("fcd,fd->fc", gradients, normals), 0, atol=1e-5)
+    assert not uv_gradients(mesh, 1).any()
+
+
+def test_gradients_of_slivers_are_numbers() -> None:
+    faces = np.array([[0, 1, 2], [0, 0, 3], [0, 1, 3]])
+    mesh = Mesh(
+        np.float32([[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1e-30, 0]]), faces, uvs=(np.ones((3, 3, 2)),)
+    )
+    sliver = replace(mesh, uvs=(np.arange(18).reshape(3, 3, 2) * 1.0,))
+    assert np.isfinite(uv_gradients(sliver)).all() and not uv_gradients(mesh).any()

@@ -18,6 +18,7 @@ _LABELS = {
     TextureSlot.BASE_COLOR: ("Base colour map", "Times the base colour"),
     TextureSlot.METALLIC_ROUGHNESS: ("Metal, rough map", "Blue times metallic, green times roughness"),
     TextureSlot.NORMAL: ("Normal map", "Bends the shading normal; OpenGL's convention, green is up"),
+    TextureSlot.BUMP: ("Height map", "Red is the height of bumps, which bend the shading normal"),
     TextureSlot.EMISSION: ("Emission map", "Times the emission, which is black at first"),
     TextureSlot.TRANSMISSION: ("Transmission map", "Red times transmission"),
     TextureSlot.SPECULAR: ("Specular map", "Alpha times specular"),
@@ -77,6 +78,8 @@ def draw(material: Material, refusals: Refusals) -> tuple[Material, TextureReque
                 widgets.value_row("   File", _described(texture), tip)
             if slot is TextureSlot.NORMAL:
                 material = _draw_strength(material, refusals, "normal_scale", "Normal strength")
+            if slot is TextureSlot.BUMP:
+                material = _draw_bump_height(material, refusals)
             if slot is TextureSlot.CLEARCOAT_NORMAL and texture is not None:
                 material = _draw_strength(material, refusals, "clearcoat_normal_scale", "Coat strength")
         return material, request
@@ -116,3 +119,9 @@ def _described(texture: Texture) -> str:
     name = "made in Python" if source.file is None else Path(source.file).name
     part = "" if source.index is None else f" {source.index}"
     return f"{name}{part}, {bitmap.width} × {bitmap.height}"
+
+
+def _draw_bump_height(material: Material, refusals: Refusals) -> Material:
+    tip = "How much higher white is than black; below 0 bumps are dents"
+    metres = widgets.number("Bump height", material.bump_scale, speed=0.001, unit=" m", decimals=4, tip=tip)
+    return refusals.changed(material, bump_scale=metres)

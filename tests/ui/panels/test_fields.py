@@ -89,6 +89,7 @@ FIELDS = [
     Field("Object", "Alpha", "scene.materials.red.alpha", "0.25", 0.25, dragged=-30),
     Field("Object", "Cutoff", "scene.materials.red.alpha_cutoff", "0.25", 0.25),
     Field("Object", "Normal strength", "scene.materials.red.normal_scale", "0.5", 0.5),
+    Field("Object", "Bump height", "scene.materials.red.bump_scale", "0.5", 0.5),
     Field("Object", "Coat strength", "scene.materials.red.clearcoat_normal_scale", "0.5", 0.5),
     *colour("Object", "Specular tint", "scene.materials.red.specular_color"),
     Field("Object", "Clearcoat", "scene.materials.red.clearcoat", "0.25", 0.25),
