@@ -80,7 +80,7 @@ RIGHT: Mapping[str, Mapping[str, Any]] = {
     "Transform.from_matrix": {"matrix": np.eye(4)},
     "Transform.moved_to": {"matrix": np.eye(4)},
     "diff": {"old": SCENE, "new": SCENE},
-    "load": {"path": "a.toml"},
+    "load": {"path": Path(__file__).parents[1] / "scenes" / "cornell.toml"},
     "load_image": {"path": "a.exr"},
     "load_mesh": {"path": "a.obj"},
     "save": {"scene": SCENE, "path": "a.toml"},

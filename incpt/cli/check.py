@@ -7,12 +7,26 @@ from typing import Annotated
 
 import typer
 
+from incpt.cli.console import complain
+from incpt.cli.options import OutsideOption, StrictOption, TimeOption
 
-def check(file: Annotated[Path, typer.Argument(help="Scene file or mesh.", show_default=False)]) -> None:
-    """Validate a scene file or a mesh, and print what is in it."""
+
+def check(
+    file: Annotated[Path, typer.Argument(help="Scene file or mesh.", show_default=False)],
+    time: TimeOption = None,
+    strict: StrictOption = False,
+    allow_outside: OutsideOption = False,
+) -> None:
+    """Validate a scene file or a mesh, and print what is in it and what was left out."""
     from incpt.formats import registry
     from incpt.scene import summary
 
-    scene = registry.load(file)
-    # Problems are among the warnings of `load`.
-    print(f"{file}: valid", *(line for line in summary.describe(scene) if "warning:" not in line), sep="\n  ")
+    scene, report = registry.load_with_report(file, time=time, allow_outside=allow_outside)
+    if strict:
+        report.check_whole()
+    for problem in summary.scene_problems(scene):
+        complain(f"warning: {file}: {problem}", 0)
+    described = [line for line in summary.describe(scene) if "warning:" not in line]
+    print(f"{file}: valid", *described, sep="\n  ")
+    if report.remarks:
+        print(*report.lines(), sep="\n")

@@ -28,6 +28,16 @@ BouncesOption = Annotated[
     int | None, typer.Option("--max-bounces", help="Scattering events after the first hit.")
 ]
 
+TimeOption = Annotated[
+    float | None, typer.Option("--time", help="Seconds into the animations of glTF files.", min=0)
+]
+StrictOption = Annotated[
+    bool, typer.Option("--strict", help="Refuse files of which anything has to be left out.")
+]
+OutsideOption = Annotated[
+    bool, typer.Option("--allow-outside", help="Let glTF files name files outside their own folders.")
+]
+
 
 def settings_from(scene: Scene, size: str | None, **given: Any) -> RenderSettings:
     """The scene's settings with those of the command line in their place, where there are any."""

@@ -13,9 +13,12 @@ from incpt.cli.console import Stopped, complain, interruption, path_progress
 from incpt.cli.options import (
     BouncesOption,
     DeviceOption,
+    OutsideOption,
     SceneArgument,
     SeedOption,
     SizeOption,
+    StrictOption,
+    TimeOption,
     padded_pixels,
     settings_from,
 )
@@ -26,8 +29,10 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
+    from incpt.formats.import_report import ImportReport
     from incpt.picture.denoise import NoiseGauge
     from incpt.render.session import Session, StepReport
+    from incpt.scene.model import Scene
 
 _LOOKS = (8, 4, 2)
 """The parts of the samples after which a picture is looked at, to tell how noisy it is."""
@@ -69,6 +74,9 @@ def render(
             "noise; needs the extra denoise.",
         ),
     ] = False,
+    time: TimeOption = None,
+    strict: StrictOption = False,
+    allow_outside: OutsideOption = False,
     device: DeviceOption = None,
 ) -> None:
     """Render a scene to a picture. Ctrl-C keeps what is done."""
@@ -82,7 +90,8 @@ def render(
         raise InputError(f"--aovs: {output} cannot hold them; use an .exr")
     if denoise:
         denoising.require_denoiser()
-    scene = registry.load(scene_file)
+    scene, report = registry.load_with_report(scene_file, time=time, allow_outside=allow_outside)
+    _complain_once(scene_file, scene, report, strict)
     if camera is not None:
         scene = scene.with_active_camera(camera)
     settings = settings_from(scene, size=size, seed=seed, strategy=strategy, max_bounces=max_bounces)
@@ -113,6 +122,22 @@ def render(
     print(f"{output}: {session.size[0]} x {session.size[1]}, {samples} samples per pixel")
     if stop.requested:
         raise Stopped(f"stopped at {samples} of {spp} samples per pixel")
+
+
+def _complain_once(file: Path, scene: Scene, report: ImportReport, strict: bool) -> None:
+    """Warns of a picture that shows nothing, and of what is left out of it: once, and in short. Raises
+    InputError for the latter where that is asked for."""
+    from incpt.formats.import_report import Fate
+    from incpt.scene import summary
+
+    if strict:
+        report.check_whole()
+    for problem in summary.scene_problems(scene):
+        complain(f"warning: {file}: {problem}", 0)
+    lost = report.of(Fate.LEFT_OUT)
+    for remark in lost[:1]:
+        more = f" (and {len(lost) - 1:,} more; `incpt check` tells all)" if len(lost) > 1 else ""
+        complain(f"warning: {remark}{more}", 0)
 
 
 @dataclass

@@ -45,7 +45,7 @@ def load_bitmap(path: str | os.PathLike[str], index: int | None = None) -> Bitma
         if index is None:
             return _known_or(path, None, lambda: _pixels(path))
         # It reads images by this module.
-        from incpt.formats.gltf import embedded_image
+        from incpt.formats.gltf.textures import embedded_image
 
         number = index
         return embedded(path, number, lambda: embedded_image(path, number))

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 from incpt.core.errors import InputError
+from incpt.formats import import_report
 from incpt.formats.vertex_attributes import NO_ATTRIBUTES, VertexAttributes
 from incpt.scene.checks import LARGEST
 from incpt.scene.mesh import Mesh
@@ -15,9 +18,9 @@ DEGENERATE = 1e-12
 
 
 def usable_mesh(
-    vertices: npt.NDArray[np.float64],
+    vertices: npt.NDArray[np.floating[Any]],
     faces: npt.NDArray[np.int64],
-    normals: npt.NDArray[np.float64] | None,
+    normals: npt.NDArray[np.floating[Any]] | None,
     counts: dict[str, int],
     attributes: VertexAttributes = NO_ATTRIBUTES,
 ) -> Mesh | None:
@@ -41,6 +44,17 @@ def usable_mesh(
     faces = faces[usable]
     corner_normals = None if normals is None else _corner_normals(stored, faces, normals)
     return Mesh(stored, faces.astype(np.int32), corner_normals, **attributes.at_corners(faces))
+
+
+def tell_of_faces(counts: dict[str, int]) -> None:
+    """Tells of the faces that `usable_mesh` has left out. Raises InputError where that are all."""
+    total = counts.get("in all", 0)
+    reasons = {reason: count for reason, count in counts.items() if count and reason != "in all"}
+    lost, listed = sum(reasons.values()), ", ".join(f"{count} {reason}" for reason, count in reasons.items())
+    if lost == total:
+        raise InputError(f"has no usable face ({listed or 'no faces in the file'})")
+    if lost:
+        import_report.left_out(f"{lost} of {total} faces: {listed}")
 
 
 def _usable_faces(
@@ -98,7 +112,7 @@ def _repeated(
 
 
 def _corner_normals(
-    vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int64], normals: npt.NDArray[np.float64]
+    vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int64], normals: npt.NDArray[np.floating[Any]]
 ) -> npt.NDArray[np.float32]:
     """(F, 3, 3) unit normals of (V, 3) normals at the vertices; a face's own where one has no direction."""
     with np.errstate(all="ignore"):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from incpt.core.affine import Vector
 from incpt.core.errors import InputError
-from incpt.formats import images, mesh_files, registry
+from incpt.formats import images, import_report, mesh_files, registry
 from incpt.formats.registry import FileKind
 from incpt.scene import edits
 from incpt.scene.edits import Names
@@ -19,9 +19,14 @@ from incpt.scene.model import Scene
 def add_mesh(
     scene: Scene, path: str | os.PathLike[str], at: Vector | None = None, material: str | None = None
 ) -> tuple[Scene, Names]:
-    """The scene with all meshes of a file, and the new names; see `edits.add_parts`. What the file lost while
-    it was read is told by an InputWarning. Raises InputError."""
-    return edits.add_parts(scene, mesh_files.load_parts(path), Path(path).stem, at, material)
+    """The scene with all meshes of a file, and the new names; see `edits.add_parts`. What is left out of the
+    file is told by InputWarnings, also its lights and cameras. Raises InputError."""
+    file = mesh_files.load_file(path)
+    with import_report.in_file(str(path)):
+        for what, count in (("lights", len(file.lights)), ("cameras", len(file.cameras))):
+            if count:
+                import_report.left_out(f"{count} {what}: open the file by itself to have them")
+    return edits.add_parts(scene, file.parts, Path(path).stem, at, material)
 
 
 def file_kind(path: str | os.PathLike[str]) -> FileKind:

@@ -10,7 +10,7 @@ from incpt.core.errors import InputError, in_place
 from incpt.formats import mesh_files
 from incpt.formats.toml_kit import text_of
 from incpt.scene.mesh import Mesh
-from incpt.scene.mesh_part import MeshPart
+from incpt.scene.mesh_part import MeshFile, MeshPart
 from incpt.scene.shapes import shape
 
 
@@ -20,22 +20,32 @@ class MeshLibrary:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._parts: dict[str, tuple[MeshPart, ...]] = {}
+        self._files: dict[str, MeshFile] = {}
 
     def meshes(self, table: Mapping[str, Any]) -> list[tuple[str | None, Mesh]]:
-        """(part, mesh) that the keys `shape`, or `mesh` and `part`, of a table ask for. Raises InputError."""
+        """(part, mesh) that the keys `shape`, or `mesh` with `part` or `geometry`, of a table ask for. Raises
+        InputError."""
         if ("shape" in table) == ("mesh" in table):
             both = "has both `shape` and `mesh`" if "shape" in table else "has neither `shape` nor `mesh`"
             raise InputError(f"{both}; give it one of them")
+        of_files = [key for key in ("part", "geometry") if key in table]
         if "shape" in table:
-            if "part" in table:
-                raise InputError("part: belongs to a mesh file; leave it out beside `shape`")
+            if of_files:
+                raise InputError(f"{of_files[0]}: belongs to a mesh file; leave it out beside `shape`")
             return [(None, shape(text_of(table, "shape", "name a built-in shape")))]
         name = text_of(table, "mesh", "name a mesh file")
+        if len(of_files) == 2:
+            raise InputError("has both `part` and `geometry`; give it one of them")
+        if "geometry" in table:
+            geometry = text_of(table, "geometry", "name a geometry of the mesh file")
+            with in_place("mesh"):
+                found = self._files.setdefault(name, mesh_files.load_file(self.folder / name))
+            return [(None, mesh_files.choose_geometry(self.folder / name, found.parts, geometry))]
         if name not in self._parts:
             with in_place("mesh"):
                 self._parts[name] = mesh_files.load_parts(self.folder / name)
         parts = self._parts[name]
         if "part" in table:
-            part = text_of(table, "part", "name a geometry of the mesh file")
+            part = text_of(table, "part", "name a part of the mesh file")
             parts = (mesh_files.choose_part(self.folder / name, parts, part),)
         return [(p.name, p.mesh) for p in parts]

@@ -1,4 +1,4 @@
-"""A scene around the meshes of a file: default light, and a camera that frames them."""
+"""A scene around the meshes of a file: where it has no light or camera, a studio and one that frames them."""
 
 from __future__ import annotations
 
@@ -11,33 +11,46 @@ from typing import Any
 import numpy as np
 
 from incpt.core.errors import in_place
-from incpt.formats import gltf_lights, images, mesh_files
+from incpt.formats import images, mesh_files
 from incpt.scene.camera import Camera
 from incpt.scene.edits import unique_name
 from incpt.scene.environment import Environment
 from incpt.scene.material import Material
-from incpt.scene.model import Object, Scene
+from incpt.scene.model import CAMERA_NAME, Object, Scene
 
 
 def scene_around(path: Path) -> Scene:
-    """The meshes of a file with their materials (grey where it has none), framed by the camera, and its
-    lights."""
-    parts = mesh_files.load_parts(path)
+    """The meshes of a file with their materials (grey where it has none), its lights and its cameras, as they
+    are. Without a camera one frames them from the front right and above; without a light they stand in a
+    studio. Raises InputError."""
+    file = mesh_files.load_file(path)
     with in_place(str(path)):
         materials: dict[str, Material] = {}
         objects = []
-        for part in parts:
+        for part in file.parts:
             material_name, material = part.material_name or "grey", part.material or Material(roughness=0.6)
             materials.setdefault(material_name, material)
             name = path.stem if part.name is None else f"{path.stem}/{part.name}"
-            objects.append(Object(name, part.mesh, material_name))
-        bounds = np.stack([o.world_bounds for o in objects])
-        camera = _framing_camera(bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0))
-        scene = Scene(camera, _pleasant_environment(), materials, tuple(objects))
-        for light in gltf_lights.lights_of(path):
+            objects.append(
+                Object(name, part.mesh, material_name, visible=part.visible, transform=part.transform)
+            )
+        cameras = dict(file.cameras) or {CAMERA_NAME: _framing_camera(*_bounds(objects))}
+        active = next(iter(cameras))
+        is_lit = any(light.is_emissive for light in file.lights)
+        environment = Environment((0.0, 0.0, 0.0)) if is_lit else _pleasant_environment()
+        scene = Scene(
+            cameras[active], environment, materials, tuple(objects), camera_name=active, cameras=cameras
+        )
+        for light in file.lights:
             name = unique_name(f"{path.stem}/{light.name}", scene.names)
             scene = scene.with_added_light(replace(light, name=name))
         return scene
+
+
+def _bounds(objects: list[Object]) -> np.ndarray[Any, Any]:
+    """(2, 3) of all that are visible, or of all where none is."""
+    bounds = np.stack([o.world_bounds for o in [o for o in objects if o.visible] or objects])
+    return np.stack([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)])
 
 
 def _framing_camera(low: np.ndarray[Any, Any], high: np.ndarray[Any, Any]) -> Camera:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from incpt.core.errors import InputError
 from incpt.core.files import read_bytes, write_bytes
 from incpt.scene.mesh import Mesh, MeshSource
-from incpt.scene.mesh_part import MeshPart
+from incpt.scene.mesh_part import MeshFile, MeshPart
 from incpt.scene.texture import UV_SETS
 
 _NAMES = ("vertices", "faces", "normals", *(f"uvs_{i}" for i in range(UV_SETS)), "colors", "tangents")
@@ -50,7 +50,7 @@ def arrays(mesh: Mesh) -> dict[str, npt.NDArray[Any]]:
     return {name: array for name, array in found.items() if array is not None}
 
 
-def read_stored(path: Path) -> tuple[MeshPart, ...]:
+def read_stored(path: Path) -> MeshFile:
     """The mesh of an .npz archive, which `store_mesh` wrote, as the only part of the file. Raises
     InputError."""
     try:
@@ -62,7 +62,7 @@ def read_stored(path: Path) -> tuple[MeshPart, ...]:
             found["vertices"], found["faces"], found.get("normals"), source, uvs, found.get("colors"),
             found.get("tangents"),
         )  # fmt: skip
-        return (MeshPart(None, mesh),)
+        return MeshFile((MeshPart(None, mesh),))
     except InputError:
         raise
     except Exception:  # zipfile, zlib and numpy raise errors of many types for damaged files.

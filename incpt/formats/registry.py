@@ -19,12 +19,15 @@ from typing import Any
 from incpt.core.checks import path_of
 from incpt.core.errors import InputError, InputWarning, in_place
 from incpt.core.files import check_readable
+from incpt.formats import import_report
+from incpt.formats.import_options import ImportOptions, reading_with
+from incpt.formats.import_report import Fate, ImportReport
 from incpt.scene.model import Scene
 from incpt.scene.summary import scene_problems
 
 
 class FileKind(Enum):
-    """What a file holds, and so what reading it gives: a Scene, a tuple of MeshPart, or an Image."""
+    """What a file holds, and so what reading it gives: a Scene, a MeshFile, or an Image."""
 
     SCENE = "scene"
     MESH = "mesh"
@@ -37,15 +40,13 @@ class Format:
 
     `reader` is the module in this folder and the function in it that takes the path of a readable file and
     returns what the kind says; what it raises as InputError does not name the file, which `read` does.
-    `needs` are modules that the reader uses and an installation may lack. `is_whole`: the file alone decides
-    what is read, so that what was read stays valid while the file keeps its age and size.
+    `needs` are modules that the reader uses and an installation may lack.
     """
 
     suffix: str
     kind: FileKind
     reader: tuple[str, str]
     needs: tuple[str, ...] = ()
-    is_whole: bool = True
 
     @property
     def is_available(self) -> bool:
@@ -53,19 +54,21 @@ class Format:
         return all(find_spec(name) is not None for name in self.needs)
 
     def read(self, path: Path) -> Any:
-        """What the file holds, see FileKind. Raises InputError."""
+        """What the file holds, see FileKind; what became of the rest is told, see `import_report`. Raises
+        InputError."""
         module, function = self.reader
-        with in_place(str(path)):
+        with in_place(str(path)), import_report.in_file(str(path)):
             return getattr(import_module(f"incpt.formats.{module}"), function)(path)
 
 
 OPENEXR = Format(".exr", FileKind.IMAGE, ("images", "read_exr"))
+_GLTF = ("gltf.reader", "read_gltf")
 _TRIMESH = ("trimesh_adapter", "read_with_trimesh")
 FORMATS = (
-    Format(".toml", FileKind.SCENE, ("scene_toml", "load_scene_toml"), is_whole=False),
+    Format(".toml", FileKind.SCENE, ("scene_toml", "load_scene_toml")),
     OPENEXR,
-    Format(".glb", FileKind.MESH, _TRIMESH),
-    Format(".gltf", FileKind.MESH, _TRIMESH, is_whole=False),
+    Format(".glb", FileKind.MESH, _GLTF),
+    Format(".gltf", FileKind.MESH, _GLTF),
     Format(".obj", FileKind.MESH, _TRIMESH),
     Format(".off", FileKind.MESH, _TRIMESH),
     Format(".ply", FileKind.MESH, _TRIMESH),
@@ -94,13 +97,27 @@ def format_of(path: str | os.PathLike[str], *kinds: FileKind) -> Format | None:
     return next(rows, None)
 
 
-def load(path: str | os.PathLike[str]) -> Scene:
+def load(path: str | os.PathLike[str], *, time: float | None = None, allow_outside: bool = False) -> Scene:
     """A scene from a scene file (.toml), or a default scene around a mesh file.
 
-    An InputWarning tells of faces that were left out and of a scene that shows nothing. Raises InputError,
-    one line that names file, table and key.
+    `time`: seconds into the animations of its files; None leaves them out. `allow_outside`: a glTF file may
+    name files outside its own folder. InputWarnings tell of all that was left out, and of a scene that shows
+    nothing. Raises InputError, one line that names file, table and key.
     """
+    scene, report = load_with_report(path, time=time, allow_outside=allow_outside)
+    for remark in report.of(Fate.LEFT_OUT):
+        warnings.warn(str(remark), InputWarning, stacklevel=2)
+    for problem in scene_problems(scene):
+        warnings.warn(f"{path}: {problem}", InputWarning, stacklevel=2)
+    return scene
+
+
+def load_with_report(
+    path: str | os.PathLike[str], *, time: float | None = None, allow_outside: bool = False
+) -> tuple[Scene, ImportReport]:
+    """A scene as `load` gives it, and what became of its files: nothing is warned of. Raises InputError."""
     path = path_of("path", path)
+    options = ImportOptions(time, allow_outside)
     check_readable(path)
     row = format_of(path, FileKind.SCENE, FileKind.MESH)
     if row is None:
@@ -108,13 +125,12 @@ def load(path: str | os.PathLike[str]) -> Scene:
             f"{path}: files of this type cannot be read; use a scene ({listed(FileKind.SCENE)}) "
             f"or a mesh ({listed(FileKind.MESH)})"
         )
-    if row.kind is FileKind.SCENE:
-        scene: Scene = row.read(path)
-    else:
-        # It reads meshes by the table above.
-        from incpt.formats.mesh_scene import scene_around
+    with import_report.gathered() as found, reading_with(options):
+        if row.kind is FileKind.SCENE:
+            scene: Scene = row.read(path)
+        else:
+            # It reads meshes by the table above.
+            from incpt.formats.mesh_scene import scene_around
 
-        scene = scene_around(path)
-    for problem in scene_problems(scene):
-        warnings.warn(f"{path}: {problem}", InputWarning, stacklevel=2)
-    return scene
+            scene = scene_around(path)
+    return scene, found.report

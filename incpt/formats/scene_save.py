@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import warnings
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
@@ -13,9 +12,9 @@ import numpy as np
 
 from incpt.core import files
 from incpt.core.checks import path_of, require
-from incpt.core.errors import InputError, InputWarning, one_line
+from incpt.core.errors import InputError, one_line
 from incpt.core.layout import TextureSlot
-from incpt.formats import bitmaps, images, mesh_files, mesh_store
+from incpt.formats import bitmaps, images, import_report, mesh_files, mesh_store
 from incpt.formats.scene_toml import VERSION
 from incpt.formats.textures import texture_value
 from incpt.scene.camera import Camera
@@ -23,7 +22,8 @@ from incpt.scene.environment import Environment
 from incpt.scene.image import Image
 from incpt.scene.light import STRENGTHS, Light
 from incpt.scene.material import Material, texture_name, texture_of
-from incpt.scene.mesh import Mesh
+from incpt.scene.mesh import Mesh, MeshSource
+from incpt.scene.mesh_part import MeshFile
 from incpt.scene.model import CAMERA_NAME, Object, Scene
 from incpt.scene.shapes import shape
 from incpt.scene.texture import Bitmap, Texture
@@ -63,6 +63,7 @@ class _Beside:
         self._written: list[Path] = []
         self._names: dict[int, dict[str, str]] = {}
         self._bitmaps: dict[int, dict[str, Any]] = {}
+        self._read: dict[str, MeshFile] = {}
 
     def undo(self) -> None:
         """Removes what was written."""
@@ -79,15 +80,29 @@ class _Beside:
         source = mesh.source
         if source.shape is not None and _same_mesh(mesh, shape(source.shape)):
             return {"shape": source.shape}
-        if source.file is not None and _same_mesh(mesh, _mesh_on_disk(source.file, source.part)):
-            part = {} if source.part is None else {"part": source.part}
-            return {"mesh": self._relative(source.file), **part}
+        if source.file is not None and _same_mesh(mesh, self._mesh_on_disk(source)):
+            choice = {"part": source.part, "geometry": source.geometry}
+            chosen = {key: name for key, name in choice.items() if name is not None}
+            return {"mesh": self._relative(source.file), **chosen}
         label = re.sub(r"[^A-Za-z0-9]+", "-", name)[:40].strip("-") or "mesh"
         path = self._folder / f"{self._stem}.{label}.{mesh_store.digest(mesh)}{mesh_store.STORED_SUFFIX}"
         if not path.exists():
             mesh_store.store_mesh(path, mesh)
             self._written.append(path)
         return {"mesh": path.name}
+
+    def _mesh_on_disk(self, source: MeshSource) -> Mesh | None:
+        file = Path(str(source.file))
+        try:
+            with import_report.gathered():
+                # Kept while the scene is written, so that a file of many meshes is read once.
+                self._read[str(file)] = self._read.get(str(file)) or mesh_files.load_file(file)
+                if source.geometry is not None:
+                    parts = self._read[str(file)].parts
+                    return mesh_files.choose_geometry(file, parts, source.geometry)
+                return mesh_files.load_mesh(file, source.part)
+        except InputError:
+            return None
 
     def image(self, image: Image) -> str:
         """The name of an image's file."""
@@ -134,15 +149,6 @@ class _Beside:
             return os.path.relpath(absolute, os.path.realpath(self._folder)).replace(os.sep, "/")
         except ValueError:  # No relative path leads to another drive.
             return os.path.abspath(file)
-
-
-def _mesh_on_disk(file: str, part: str | None) -> Mesh | None:
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", InputWarning)
-            return mesh_files.load_mesh(file, part)
-    except InputError:
-        return None
 
 
 def _same_mesh(a: Mesh, b: Mesh | None) -> bool:

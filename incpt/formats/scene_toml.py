@@ -45,7 +45,7 @@ SKY_KEYS = tuple(field.name for field in fields(Sky))
 ENVIRONMENT_KEYS = tuple(field.name for field in fields(Environment))
 MATERIAL_KEYS = tuple(field.name for field in fields(Material))
 PLACEMENT_KEYS = ("position", "rotation", "scale", "matrix", "visible")
-MESH_KEYS = ("shape", "mesh", "part")
+MESH_KEYS = ("shape", "mesh", "part", "geometry")
 LIGHT_KEYS = (
     *(field.name for field in fields(Light) if field.name not in ("name", "transform", "visible")),
     *PLACEMENT_KEYS,

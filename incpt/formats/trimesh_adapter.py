@@ -1,8 +1,8 @@
 """Mesh files, read by trimesh and checked here.
 
 trimesh is lenient where a renderer must not be: it makes up vertex normals, keeps faces that point at no
-vertex, fills a Draco-compressed glTF with zeros, and raises whatever comes up on damaged files. Every way
-out of this module is a usable Mesh or an InputError; what had to be left out is told by an InputWarning.
+vertex, and raises whatever comes up on damaged files. Every way out of this module is a usable Mesh or an
+InputError; what had to be left out is told in the report.
 """
 
 from __future__ import annotations
@@ -22,60 +22,48 @@ import numpy as np
 import numpy.typing as npt
 import trimesh
 
-from incpt.core.errors import InputError, InputWarning, reason_of
+from incpt.core.errors import InputError, reason_of
 from incpt.core.files import read_bytes
-from incpt.formats.clean import usable_mesh
-from incpt.formats.gltf import gltf_attributes, gltf_header, gltf_materials
-from incpt.formats.gltf_data import GltfData
+from incpt.formats.clean import tell_of_faces, usable_mesh
 from incpt.formats.obj import ODD_FACE, absolute_obj, utf8
+from incpt.formats.placement import placed_arrays
 from incpt.formats.vertex_attributes import VertexAttributes
 from incpt.picture.color import linear_from_srgb
 from incpt.scene.mesh import MeshSource
-from incpt.scene.mesh_part import MeshPart
+from incpt.scene.mesh_part import MeshFile, MeshPart
 
 _UV_UPWARDS = ("obj", "ply", "dae")
 """Files whose texture coordinates are (0, 0) at the bottom left of an image."""
 
 
-def read_with_trimesh(path: Path) -> tuple[MeshPart, ...]:
-    """The parts of a mesh file that trimesh can read; see `mesh_files.load_parts`. Raises InputError."""
+def read_with_trimesh(path: Path) -> MeshFile:
+    """A mesh file that trimesh can read; see `mesh_files.load_file`. Raises InputError."""
     suffix = path.suffix[1:].lower()
-    header: dict[str, Any] = {}
-    if suffix in ("glb", "gltf"):
-        header = gltf_header(path, suffix)
     loaded, dropped = _load_obj(path) if suffix == "obj" else (_load(path, suffix), 0)
     counts = {"in all": dropped, "with an index out of range": dropped}
     instances = _instances(loaded)
-    data = GltfData(path, header)
-    materials = gltf_materials(data, list(loaded.geometry))
-    from_header = gltf_attributes(data, list(loaded.geometry))
     parts = []
     for name, geometry_name, matrix in instances:
         geometry = loaded.geometry[geometry_name]
         # STL has a normal for each face, of which trimesh makes normals at vertices.
         normals = None if suffix == "stl" else _normals(geometry)
-        attributes = from_header.get(geometry_name) or _attributes(geometry, suffix)
-        mesh = usable_mesh(*_placed(geometry, normals, matrix), counts, attributes.placed(matrix[:3, :3]))
+        vertices, faces = np.asarray(geometry.vertices, np.float64), np.asarray(geometry.faces, np.int64)
+        arrays = placed_arrays(vertices, faces, normals, matrix)
+        mesh = usable_mesh(*arrays, counts, _attributes(geometry, suffix).placed(matrix[:3, :3]))
         if mesh is not None:
-            parts.append(MeshPart(name, mesh, *materials.get(geometry_name, (None, None))))
-    left_out = ", ".join(
-        f"{count} {reason}" for reason, count in counts.items() if count and reason != "in all"
-    )
-    if not parts:
-        raise InputError(f"has no usable face ({left_out or 'no faces in the file'})")
-    if left_out:
-        total = counts["in all"]
-        lost = sum(counts.values()) - total
-        warnings.warn(f"{path}: left out {lost} of {total} faces: {left_out}", InputWarning, stacklevel=5)
+            parts.append(MeshPart(name, mesh))
+    tell_of_faces(counts)
     single = len(instances) == 1
     source = MeshSource(file=os.path.abspath(path))
-    return tuple(
-        replace(
-            p,
-            name=None if single else p.name,
-            mesh=replace(p.mesh, source=source if single else replace(source, part=p.name)),
+    return MeshFile(
+        tuple(
+            replace(
+                p,
+                name=None if single else p.name,
+                mesh=replace(p.mesh, source=source if single else replace(source, part=p.name)),
+            )
+            for p in parts
         )
-        for p in parts
     )
 
 
@@ -106,45 +94,17 @@ def _attributes(geometry: trimesh.Trimesh, suffix: str) -> VertexAttributes:
     return found
 
 
-def _placed(
-    geometry: trimesh.Trimesh, normals: npt.NDArray[np.float64] | None, matrix: npt.NDArray[np.float64]
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64], npt.NDArray[np.float64] | None]:
-    """Vertices (V, 3), faces (F, 3) and normals (V, 3) in the space of the file, under a (4, 4) matrix that
-    places them there; faces are turned over where it mirrors. The arrays are not checked."""
-    vertices = np.asarray(geometry.vertices, np.float64)
-    faces = np.asarray(geometry.faces, np.int64)
-    if np.array_equal(matrix, np.eye(4)) or vertices.ndim != 2 or vertices.shape[1] != 3:
-        return vertices, faces, normals
-    with np.errstate(all="ignore"):
-        linear = matrix[:3, :3]
-        vertices = vertices @ linear.T + matrix[:3, 3]
-        if normals is not None:
-            # The cofactor matrix is det · inverse transpose, and exists for flat placements too.
-            x, y, z = linear.T
-            cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=1)
-            normals = normals @ cofactors.T * np.sign(np.linalg.det(linear))
-        if np.linalg.det(linear) < 0:
-            faces = faces[:, ::-1]
-    return vertices, faces, normals
-
-
 @contextmanager
-def _quiet() -> Iterator[list[str]]:
-    """Collects what trimesh logs and drops what it and numpy warn about: the error names the problem."""
-    messages: list[str] = []
-
-    class Collect(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            messages.append(record.getMessage())
-
+def _quiet() -> Iterator[None]:
+    """Drops what trimesh logs, and what it and numpy warn about: the error names the problem."""
     log = logging.getLogger("trimesh")
-    handler, propagate = Collect(logging.WARNING), log.propagate
+    handler, propagate = logging.NullHandler(), log.propagate
     log.addHandler(handler)
     log.propagate = False
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            yield messages
+            yield
     finally:
         log.propagate = propagate
         log.removeHandler(handler)
@@ -152,19 +112,17 @@ def _quiet() -> Iterator[list[str]]:
 
 def _load(path: Path, suffix: str, content: bytes | None = None) -> trimesh.Scene:
     options: dict[str, Any] = {"process": False}
-    if suffix in ("obj", "ply", "glb", "gltf"):
+    if suffix in ("obj", "ply"):
         # Textures are not used, so that no file but this one is opened.
         options["skip_materials"] = True
     if suffix == "obj":
         options |= {"split_objects": True, "group_material": False}
     try:
-        with _quiet() as messages:
+        with _quiet():
             stream: Any = str(path) if content is None else io.BytesIO(content)
             loaded = trimesh.load_scene(stream, file_type=suffix, **options)
     except Exception as error:  # trimesh raises errors of any type for a damaged file.
         raise InputError(f"is no {suffix.upper()} mesh, or a damaged one ({reason_of(error)})") from None
-    if any("placeholder zeros" in message for message in messages):
-        raise InputError("is compressed in a way that cannot be decoded; export it uncompressed")
     return loaded
 
 
@@ -190,19 +148,15 @@ def _load_obj(path: Path) -> tuple[trimesh.Scene, int]:
 def _instances(loaded: trimesh.Scene) -> list[tuple[str, str, npt.NDArray[np.float64]]]:
     """(name, name of the geometry, (4, 4) placement) of every placed triangle mesh.
 
-    Ordered by geometry, then by name. A glTF node with several primitives gets random frame names from
-    trimesh: its parts are numbered instead, so that they are the same the next time.
+    Ordered by geometry, then by name.
     """
     order = {name: index for index, name in enumerate(loaded.geometry)}
-    parents = {child: parent for parent, child, _ in loaded.graph.to_edgelist()}  # type: ignore[no-untyped-call]
     found = []
     for node in loaded.graph.nodes_geometry:
         matrix, geometry_name = loaded.graph.get(node)
         mesh = loaded.geometry.get(geometry_name)
         if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
-            numbered = mesh.metadata.get("from_gltf_primitive") is True
-            name = str(parents[node] if numbered else node)
-            found.append((order[geometry_name], name, str(geometry_name), matrix))
+            found.append((order[geometry_name], str(node), str(geometry_name), matrix))
     uses = Counter(name for _, name, _, _ in found)
     used: set[str] = set()
     result: list[tuple[str, str, npt.NDArray[np.float64]]] = []

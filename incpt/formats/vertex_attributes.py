@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from incpt.scene.checks import LARGEST
 
-Array = npt.NDArray[np.float64]
+Array = npt.NDArray[np.floating[Any]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -79,12 +79,14 @@ def add_parts(
     Materials that the file brings come along, under another name where the scene has a different one of
     that name; meshes without one get `material` as in `add_shape`. Raises InputError.
     """
-    boxes = np.stack([part.mesh.bounds for part in parts])
+    # Named and put together below; here they tell where they stand in the file.
+    placed = [Object("part", part.mesh, "", visible=part.visible, transform=part.transform) for part in parts]
+    boxes = np.stack([one.world_bounds for one in placed])
     bounds = np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
-    position = _standing_on(at or floor_point(scene), bounds)
+    moved = np.array(_standing_on(at or floor_point(scene), bounds))
     names: list[str] = []
     brought: dict[str, str] = {}
-    for part in parts:
+    for part, one in zip(parts, placed, strict=True):
         if part.material is None or part.material_name is None:
             scene, used = _with_material_for_new(scene, material)
         else:
@@ -93,7 +95,8 @@ def add_parts(
             used = brought[part.material_name]
         wanted = label if part.name is None else f"{label}/{part.name}"
         name = unique_name(wanted or "mesh", scene.names)
-        scene = scene.with_added(Object(name, part.mesh, used, position))
+        transform = one.transform.with_parts(position=_vector(moved + one.position))
+        scene = scene.with_added(replace(one, name=name, material=used, transform=transform))
         names.append(name)
     return scene, tuple(names)
 

@@ -18,15 +18,17 @@ from incpt.scene.texture import UV_SETS
 
 @dataclass(frozen=True)
 class MeshSource:
-    """Where a mesh came from, which is what a scene file stores: a built-in shape, or a file and a part
-    of it (a named geometry, where the file holds several). Both None: made in Python."""
+    """Where a mesh came from, which is what a scene file stores: a built-in shape, or a file and, where that
+    holds several, one of them: a `part`, by its name, as the file places it, or a `geometry`, in its own
+    space, which the file may show at several places. All None: made in Python."""
 
     shape: str | None = None
     file: str | None = None
     part: str | None = None
+    geometry: str | None = None
 
     def __post_init__(self) -> None:
-        for name in ("shape", "file", "part"):
+        for name in ("shape", "file", "part", "geometry"):
             require(name, getattr(self, name), (str, NoneType), "a text")
 
 

@@ -17,6 +17,7 @@ import numpy as np
 import OpenEXR
 import PIL.Image
 import pytest
+from support.gltf_files import GltfBuilder
 
 from incpt.cli.console import PathProgress, interruption, path_progress
 from incpt.cli.main import main
@@ -179,10 +180,10 @@ def test_the_second_ctrl_c_does_not_wait() -> None:
 def test_ctrl_c_outside_of_a_step(
     scene_file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def interrupted(*_: object) -> None:
+    def interrupted(*_: object, **options: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(registry, "load", interrupted)
+    monkeypatch.setattr(registry, "load_with_report", interrupted)
     assert run("check", scene_file) == 130
     assert only_line(capsys.readouterr().err) == "incpt: stopped"
 
@@ -294,10 +295,10 @@ def test_failures_are_one_line(
     status: int,
     said: str,
 ) -> None:
-    def fail(*_: object) -> None:
+    def fail(*_: object, **options: object) -> None:
         raise error
 
-    monkeypatch.setattr(registry, "load", fail)
+    monkeypatch.setattr(registry, "load_with_report", fail)
     assert run("check", "scene.toml") == status
     assert said in only_line(capsys.readouterr().err)
     assert run("check", "scene.toml", "--debug") == status
@@ -350,6 +351,52 @@ def test_check_takes_a_mesh(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     assert run("check", mesh) == 0
     assert "1 triangles placed" in capsys.readouterr().out
+
+
+GLTF = GltfBuilder()
+QUAD = GLTF.quad()
+
+
+def gltf_file(folder: Path) -> Path:
+    """A file of which two things are left out."""
+    points, lines = ({**QUAD, "mode": mode} for mode in (0, 1))
+    return GLTF.write(folder / "a.glb", [QUAD, points, lines])
+
+
+def test_check_tells_what_became_of_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = gltf_file(tmp_path)
+    assert run("check", path) == 0
+    said = capsys.readouterr()
+    assert said.out.endswith(
+        f"{path}:\n  left out: points of mesh 'mesh 0': have no area\n"
+        "  left out: lines of mesh 'mesh 0': have no area\n  read: 1 object, 1 mesh\n"
+    )
+    assert said.err == ""
+
+
+@pytest.mark.parametrize("command", ["check", "render"])
+def test_strict_refuses_what_is_not_read_whole(
+    tmp_path: Path, command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    more = ("-o", tmp_path / "a.png") if command == "render" else ()
+    path = gltf_file(tmp_path)
+    assert run(command, path, *more, "--strict") == 2
+    assert only_line(capsys.readouterr().err) == (
+        f"incpt: {path}: left out points of mesh 'mesh 0': have no area (and 1 more); "
+        "leave --strict away to go on without"
+    )
+    assert not (tmp_path / "a.png").exists()
+    assert run("check", GLTF.write(tmp_path / "whole.glb", [QUAD]), "--strict") == 0
+
+
+@pytest.mark.slow
+def test_render_tells_once_what_is_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = gltf_file(tmp_path)
+    assert run("render", path, "-o", tmp_path / "a.png", "--spp", 1, "--size", "8x8") == 0
+    assert only_line(capsys.readouterr().err) == (
+        f"incpt: warning: {path}: left out points of mesh 'mesh 0': have no area "
+        "(and 1 more; `incpt check` tells all)"
+    )
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from incpt.core.errors import InputError
-from incpt.formats import images
+from incpt.formats import images, mesh_files
 from incpt.formats.edit_script import DEFAULT_CAPTURE, EditScript, load_edits
 from incpt.scene.change import diff
 from incpt.scene.environment import Environment
@@ -164,7 +164,7 @@ def test_several_meshes_need_a_part(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="holds 2 meshes; choose one with `part`"):
         load_text(tmp_path, BALL + "mesh = 'two.glb'\n")
     script = load_text(tmp_path, BALL + "mesh = 'two.glb'\npart = 'b'\n")
-    assert script.scenes(SCENE)[0].object("ball").mesh.source.part == "b"
+    assert script.scenes(SCENE)[0].object("ball").mesh is mesh_files.load_mesh(tmp_path / "two.glb", "b")
 
 
 def test_edits_of_cameras_by_name(tmp_path: Path) -> None:

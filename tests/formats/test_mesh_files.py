@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import importlib.util
 import json
 import struct
 import warnings
@@ -207,7 +206,8 @@ def test_gltf_materials_are_read_when_there_are_some(tmp_path: Path) -> None:
     broken = write_gltf(
         tmp_path / "b.gltf", materials=[{"pbrMetallicRoughness": 5}], meshes=[{"primitives": [primitive]}]
     )
-    assert mesh_files.load_parts(broken)[0].material is None
+    with pytest.raises(InputError, match=r"material 'material 0': .*pbrMetallicRoughness: 5 is no object"):
+        mesh_files.load_parts(broken)
 
 
 def test_bad_faces_are_left_out_and_told(tmp_path: Path) -> None:
@@ -267,8 +267,10 @@ def test_a_polygon_becomes_a_fan(tmp_path: Path) -> None:
         ("a.stl", bytes(84), "is no STL mesh|no usable face"),
         ("a.glb", b"glTF" + bytes(20), "is no GLB mesh"),
         ("a.glb", b"PK\3\4" * 20, "is no GLB mesh"),
-        ("a.gltf", b"[1, 2]", "is no GLTF mesh"),
-        ("a.gltf", b'{"asset": {"version": "1.0"}}', "is no GLTF mesh"),
+        ("a.gltf", b"[1, 2]", "is no object; the file is damaged"),
+        ("a.gltf", b"{", "is no GLTF mesh"),
+        ("a.gltf", b'{"asset": {"version": "1.0"}}', "asset.version: says glTF 1.0; convert"),
+        ("a.glb", b"glTF" + (1).to_bytes(4, "little") + bytes(12), "says version 1.; convert it to glTF 2.0"),
         ("a.gltf", b'{"asset": {"version": "2.0"}}', "no usable face|is no GLTF"),
         ("a.off", b"OFF\n3 1 0\n0 0 0\n", "is no OFF mesh"),
         ("a.npz", b"PK\3\4 no archive", "is no mesh archive"),
@@ -305,50 +307,6 @@ def test_truncated_files(tmp_path: Path, suffix: str, kept: float) -> None:
     path.write_bytes(content[: int(kept * len(content)) if kept < 1 else int(kept)])
     with pytest.raises(InputError):
         mesh_files.load_mesh(path)
-
-
-def test_draco_without_a_decoder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    extension = {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}}
-    primitive = {"attributes": {"POSITION": 0}, "indices": 2, "extensions": extension}
-    accessors = [
-        {"componentType": 5126, "count": 3, "type": "VEC3"},
-        {"componentType": 5126, "count": 3, "type": "VEC3"},
-        {"componentType": 5125, "count": 3, "type": "SCALAR"},
-    ]
-    path = write_gltf(tmp_path / "d.gltf", accessors=accessors, meshes=[{"primitives": [primitive]}])
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(InputError, match="Draco-compressed; install DracoPy"):
-        mesh_files.load_mesh(path)
-    # With a decoder that fails, trimesh leaves zeros and only logs it.
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: object())
-    with pytest.raises(InputError, match="cannot be decoded"):
-        mesh_files.load_mesh(path)
-
-
-@pytest.mark.parametrize(
-    ("accessor", "message"),
-    [
-        ({"count": 3}, "sparsely"),
-        ({"count": 10**15}, "claims 1000000000000000 values"),
-        ({"bufferView": 0, "count": 3, "sparse": {}}, "sparsely"),
-        ({"bufferView": 0, "count": 3, "normalized": True}, "quantised"),
-        ({"bufferView": 0, "count": 3000}, "is no GLTF"),
-        ({"bufferView": 7, "count": 3}, "is no GLTF"),
-        ({"bufferView": 0, "count": -3}, "no usable face"),
-    ],
-)
-def test_what_trimesh_would_read_wrongly(tmp_path: Path, accessor: dict[str, object], message: str) -> None:
-    accessors = list(gltf()["accessors"])  # type: ignore[call-overload]
-    accessors[0] = {"componentType": 5126, "type": "VEC3", **accessor}
-    with pytest.raises(InputError, match=message):
-        mesh_files.load_mesh(write_gltf(tmp_path / "a.gltf", accessors=accessors))
-
-
-def test_gltf_buffers(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"gone\.bin: no such file"):
-        mesh_files.load_mesh(write_gltf(tmp_path / "a.gltf", buffers=[{"byteLength": 84, "uri": "gone.bin"}]))
-    with pytest.raises(InputError, match="meshopt"):
-        mesh_files.load_mesh(write_gltf(tmp_path / "a.gltf", extensionsRequired=["EXT_meshopt_compression"]))
 
 
 def test_a_node_that_flattens_leaves_no_face(tmp_path: Path) -> None:
@@ -433,3 +391,25 @@ def check_loads_or_explains(path: Path) -> None:
         except InputError as error:
             message = str(error)
     assert message.startswith(str(path)) and len(message.splitlines()) == 1
+
+
+def test_obj_has_texture_coordinates(tmp_path: Path) -> None:
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 0.75\nf 1/1 2/2 3/3\n")
+    (part,) = mesh_files.load_parts(path)
+    np.testing.assert_allclose(part.mesh.uvs[0], [[[0, 1], [1, 1], [0, 0.25]]], atol=1e-6)
+
+
+def test_colours_of_ply_are_linear(tmp_path: Path) -> None:
+    lines = ["ply", "format ascii 1.0", "element vertex 3"]
+    lines += [f"property float {axis}" for axis in "xyz"] + [
+        f"property uchar {c}" for c in ("red", "green", "blue")
+    ]
+    lines += ["element face 1", "property list uchar int vertex_indices", "end_header"]
+    path = tmp_path / "a.ply"
+    path.write_text(
+        "\n".join([*lines, "0 0 0 255 0 128", "1 0 0 255 0 128", "0 1 0 255 0 128", "3 0 1 2", ""])
+    )
+    (part,) = mesh_files.load_parts(path)
+    assert part.mesh.colors is not None
+    np.testing.assert_allclose(part.mesh.colors[0, 0], [1, 0, 0.21586, 1], atol=1e-4)

@@ -55,14 +55,3 @@ def test_a_format_without_its_library_is_unknown(tmp_path: Path, monkeypatch: py
     assert ".tri" not in registry.suffixes(FileKind.MESH)
     with pytest.raises(InputError, match="cannot be read"):
         registry.load(tmp_path / "cube.tri")
-
-
-def test_meshes_of_several_files_are_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "cube.tri"
-    mesh_store.store_mesh(path, shape("cube"))
-    for is_whole in (True, False):
-        row = Format(".tri", FileKind.MESH, ("mesh_store", "read_stored"), is_whole=is_whole)
-        monkeypatch.setattr(registry, "FORMATS", (*FORMATS, row))
-        mesh = mesh_files.load_mesh(path)
-        assert (mesh_files.load_mesh(path) is mesh) == is_whole
-        del mesh

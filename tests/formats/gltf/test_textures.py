@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import base64
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
+from support.gltf_files import GltfBuilder, write_document
 
 from incpt.core.errors import InputError, InputWarning
 from incpt.core.layout import TextureSlot
@@ -25,65 +24,27 @@ FACES = np.uint16([[0, 1, 2], [0, 2, 3]])
 UVS = np.float32([[0, 1], [1, 1], [1, 0], [0, 0]])
 PIXELS = np.arange(36, dtype=np.uint8).reshape(3, 4, 3) * 7
 
-_TYPES = {"float32": 5126, "uint16": 5123, "uint8": 5121, "int8": 5120, "int16": 5122, "uint32": 5125}
-_SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
-
-class Writer:
-    """Makes a small glTF file."""
+class Writer(GltfBuilder):
+    """A quad with a material."""
 
     def __init__(self) -> None:
-        self.content = b""
-        self.views: list[dict[str, Any]] = []
-        self.accessors: list[dict[str, Any]] = []
+        super().__init__()
         self.more: dict[str, Any] = {}
 
-    def view(self, content: bytes, **more: Any) -> int:
-        self.content += bytes(-len(self.content) % 4)
-        self.views.append({"buffer": 0, "byteOffset": len(self.content), "byteLength": len(content), **more})
-        self.content += content
-        return len(self.views) - 1
-
-    def accessor(self, values: npt.NDArray[Any], **more: Any) -> int:
-        values = values.reshape(len(values), -1) if values.ndim > 1 else values[:, None]
-        view = self.view(values.tobytes())
-        kind = {"componentType": _TYPES[values.dtype.name], "type": _SHAPES[values.shape[1]]}
-        bounds = {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
-        self.accessors.append({"bufferView": view, "count": len(values), **kind, **bounds, **more})
-        return len(self.accessors) - 1
-
-    def document(self, attributes: dict[str, int], material: dict[str, Any]) -> dict[str, Any]:
+    def _whole(self, attributes: dict[str, int], material: dict[str, Any]) -> dict[str, Any]:
         primitive = {
             "attributes": {"POSITION": self.accessor(POSITIONS), **attributes},
             "indices": self.accessor(FACES.ravel()),
             "material": 0,
         }
-        return {
-            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
-            "nodes": [{"mesh": 0, **self.more.pop("node", {})}], "meshes": [{"primitives": [primitive]}],
-            "materials": [material], "accessors": self.accessors, "bufferViews": self.views,
-            "buffers": [{"byteLength": len(self.content)}], **self.more,
-        }  # fmt: skip
+        nodes = [{"mesh": 0, **self.more.pop("node", {})}]
+        return self.document([primitive], nodes=nodes, materials=[material], **self.more)
 
     def write_gltf(self, path: Path, attributes: dict[str, int], material: dict[str, Any]) -> Path:
-        document = self.document(attributes, material)
-        text = base64.b64encode(self.content).decode()
-        document["buffers"] = [
-            {"byteLength": len(self.content), "uri": f"data:application/octet-stream;base64,{text}"}
-        ]
-        path.write_text(json.dumps(document))
-        return path
+        return write_document(path, self._whole(attributes, material), self.content)
 
-    def write_glb(self, path: Path, attributes: dict[str, int], material: dict[str, Any]) -> Path:
-        text = json.dumps(self.document(attributes, material)).encode()
-        text += b" " * (-len(text) % 4)
-        body = self.content + bytes(-len(self.content) % 4)
-        chunks = [(text, b"JSON"), (body, b"BIN\0")]
-        joined = b"".join(len(c).to_bytes(4, "little") + kind + c for c, kind in chunks)
-        path.write_bytes(
-            b"glTF" + (2).to_bytes(4, "little") + (12 + len(joined)).to_bytes(4, "little") + joined
-        )
-        return path
+    write_glb = write_gltf
 
 
 def png(folder: Path) -> bytes:
@@ -288,7 +249,7 @@ def test_a_texture_that_cannot_be_found_leaves_the_rest_of_its_material(
         "pbrMetallicRoughness": {"baseColorTexture": {"index": index}, "roughnessFactor": 0.25},
     }  # fmt: skip
     path = writer.write_gltf(tmp_path / "a.gltf", {"TEXCOORD_0": writer.accessor(UVS)}, material)
-    with pytest.warns(InputWarning, match=r"a.gltf: material 'leaf': left out a texture"):
+    with pytest.warns(InputWarning, match=r"a.gltf: left out normalTexture of material 'leaf': "):
         made = only_part(path).material
     assert made is not None and made.base_color_texture is None
     assert (made.alpha_mode, made.alpha_cutoff, made.normal_scale, made.roughness) == ("mask", 1.5, -1, 0.25)
@@ -307,23 +268,39 @@ def test_images_in_a_file_are_the_same_wherever_they_come_from(tmp_path: Path) -
         bitmaps.load_bitmap(path)
 
 
-def test_what_is_wrong_with_an_image_is_one_line(tmp_path: Path) -> None:
-    content = png(tmp_path)
+def test_an_image_that_cannot_be_read_is_left_out_and_told(tmp_path: Path) -> None:
+    damaged = base64.b64encode(png(tmp_path)[:40]).decode()
     for name, image, words in (
         ("missing", {"uri": "nowhere.png"}, "nowhere.png: no such file"),
         (
             "damaged",
-            {"uri": "data:image/png;base64," + base64.b64encode(content[:40]).decode()},
+            {"uri": "data:image/png;base64," + damaged},
             "image 0: is",
         ),
         ("odd", {"uri": "data:image/png;base64,###"}, "image 0: "),
+        ("basis", {"uri": "a.ktx2"}, "Basis Universal .*`gltf-transform"),
+        ("typed", {"uri": "data:image/ktx2;base64,AAAA"}, "Basis Universal"),
     ):
         writer = Writer()
         writer.more = {"images": [image], "textures": [{"source": 0}]}
-        material = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
+        material = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "roughnessFactor": 0.5}}
         path = writer.write_gltf(tmp_path / f"{name}.gltf", {"TEXCOORD_0": writer.accessor(UVS)}, material)
-        with pytest.raises(InputError, match=rf"^[^\n]*{name}.gltf: [^\n]*{words}[^\n]*$"):
-            mesh_files.load_parts(path)
+        with pytest.warns(InputWarning, match=rf"^[^\n]*{name}.gltf: left out baseColor[^\n]*{words}[^\n]*$"):
+            made = only_part(path).material
+        assert made is not None and made.base_color_texture is None and made.roughness == 0.5
+
+
+def test_of_several_images_the_one_that_can_be_read_is_taken(tmp_path: Path) -> None:
+    (tmp_path / "made.png").write_bytes(png(tmp_path))
+    basis = {"source": 0, "extensions": {"KHR_texture_basisu": {"source": 1}}}
+    webp = {"source": 1, "extensions": {"EXT_texture_webp": {"source": 0}}}
+    for texture in (basis, webp):
+        writer = Writer()
+        writer.more = {"images": [{"uri": "made.png"}, {"uri": "other.ktx2"}], "textures": [texture]}
+        material = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
+        path = writer.write_gltf(tmp_path / "a.gltf", {"TEXCOORD_0": writer.accessor(UVS)}, material)
+        made = only_part(path).material
+        assert made is not None and made.base_color_texture is not None
 
 
 def test_a_damaged_accessor_is_one_line(tmp_path: Path) -> None:
@@ -333,25 +310,3 @@ def test_a_damaged_accessor_is_one_line(tmp_path: Path) -> None:
     path = writer.write_gltf(tmp_path / "a.gltf", {"TEXCOORD_0": uvs}, {})
     with pytest.raises(InputError, match=r"^[^\n]*a.gltf: [^\n]*$"):
         mesh_files.load_parts(path)
-
-
-def test_obj_has_texture_coordinates(tmp_path: Path) -> None:
-    path = tmp_path / "a.obj"
-    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 0.75\nf 1/1 2/2 3/3\n")
-    (part,) = mesh_files.load_parts(path)
-    np.testing.assert_allclose(part.mesh.uvs[0], [[[0, 1], [1, 1], [0, 0.25]]], atol=1e-6)
-
-
-def test_colours_of_ply_are_linear(tmp_path: Path) -> None:
-    lines = ["ply", "format ascii 1.0", "element vertex 3"]
-    lines += [f"property float {axis}" for axis in "xyz"] + [
-        f"property uchar {c}" for c in ("red", "green", "blue")
-    ]
-    lines += ["element face 1", "property list uchar int vertex_indices", "end_header"]
-    path = tmp_path / "a.ply"
-    path.write_text(
-        "\n".join([*lines, "0 0 0 255 0 128", "1 0 0 255 0 128", "0 1 0 255 0 128", "3 0 1 2", ""])
-    )
-    (part,) = mesh_files.load_parts(path)
-    assert part.mesh.colors is not None
-    np.testing.assert_allclose(part.mesh.colors[0, 0], [1, 0, 0.21586, 1], atol=1e-4)

@@ -79,14 +79,14 @@ def test_names_differ(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("lights", "message"),
     [
-        ([{"type": "area"}], "has lights that cannot be read"),
-        ([], "has lights that cannot be read"),
-        (3, "has lights that cannot be read"),
-        ([{"type": "point", "intensity": "bright"}], "has lights that cannot be read"),
-        ([{"type": "point", "color": [-1, 0, 0]}], "light: color: -1 is out of range"),
+        ([{"type": "area"}], r"light '\d': type: 'area'"),
+        ([], r"extensions\.KHR_lights_punctual\.lights: has 0 entries"),
+        (3, r"extensions\.KHR_lights_punctual\.lights: 3 is no list"),
+        ([{"type": "point", "intensity": "bright"}], r"light '\d': .*intensity: 'bright' is not a number"),
+        ([{"type": "point", "color": [-1, 0, 0]}], r"light '\d': color: -1 is out of range"),
         (
             [{"type": "spot", "spot": {"innerConeAngle": 2, "outerConeAngle": 1}}],
-            "light: spot_blend: -1 is out",
+            r"light '\d': spot_blend: -1 is out",
         ),
     ],
 )
