@@ -44,6 +44,13 @@ def frozen(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return array
 
 
+def handed_over(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """The same array, which its maker gives away and keeps no way to write to, so that `frozen` need not copy
+    it."""
+    array.flags.writeable = False
+    return array
+
+
 def _is_frozen(array: npt.NDArray[Any]) -> bool:
     memory: Any = array
     while isinstance(memory, np.ndarray):

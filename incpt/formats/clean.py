@@ -7,12 +7,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from incpt.core.arrays import handed_over
 from incpt.core.errors import InputError
 from incpt.formats import import_report
 from incpt.formats.vertex_attributes import NO_ATTRIBUTES, VertexAttributes
 from incpt.scene.checks import LARGEST
 from incpt.scene.mesh import Mesh
 
+_PIECE = 1 << 17
+"""Faces that are looked at together."""
 DEGENERATE = 1e-12
 """Twice the area of a face over its longest edge squared: below it the face has no normal to speak of."""
 
@@ -41,9 +44,10 @@ def usable_mesh(
     finite = np.all(np.abs(stored) <= LARGEST, axis=1)
     # No face uses these vertices any more, but a mesh holds finite ones only.
     stored = np.where(finite[:, None], stored, np.float32(0))
-    faces = faces[usable]
-    corner_normals = None if normals is None else _corner_normals(stored, faces, normals)
-    return Mesh(stored, faces.astype(np.int32), corner_normals, **attributes.at_corners(faces))
+    faces = faces if usable.all() else faces[usable]
+    corner_normals = None if normals is None else handed_over(_corner_normals(stored, faces, normals))
+    at_corners = attributes.at_corners(faces)
+    return Mesh(handed_over(stored), handed_over(faces.astype(np.int32)), corner_normals, **at_corners)
 
 
 def tell_of_faces(counts: dict[str, int]) -> None:
@@ -62,7 +66,7 @@ def _usable_faces(
 ) -> npt.NDArray[np.bool_]:
     """(F,) which faces of vertices (V, 3) to keep; the reasons against the others are counted."""
     usable: npt.NDArray[np.bool_] = np.all((faces >= 0) & (faces < len(vertices)), axis=1)
-    in_range = np.where(usable[:, None], faces, 0)
+    in_range = faces if usable.all() else np.where(usable[:, None], faces, 0)
     _count(counts, "in all", len(faces))
     _count(counts, "with an index out of range", int((~usable).sum()))
     if not len(vertices):
@@ -72,12 +76,7 @@ def _usable_faces(
     bad = usable & ~finite[in_range].all(axis=1)
     _count(counts, "with a vertex that is not finite or too far away", int(bad.sum()))
     usable &= ~bad
-    with np.errstate(all="ignore"):
-        a, b, c = (vertices[in_range[:, corner]].astype(np.float64) for corner in range(3))
-        ab, ac, bc = b - a, c - a, c - b
-        longest = np.maximum(np.maximum((ab**2).sum(axis=1), (ac**2).sum(axis=1)), (bc**2).sum(axis=1))
-        area = np.linalg.norm(np.cross(ab, ac), axis=1)
-        bad = usable & ~(area > DEGENERATE * longest)
+    bad = usable & ~_has_area(vertices, in_range)
     _count(counts, "with zero area", int(bad.sum()))
     usable &= ~bad
     bad = usable & _repeated(vertices, in_range, usable)
@@ -89,26 +88,72 @@ def _count(counts: dict[str, int], reason: str, number: int) -> None:
     counts[reason] = counts.get(reason, 0) + number
 
 
+def _has_area(vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+    """(F,)"""
+    found: npt.NDArray[np.bool_] = np.empty(len(faces), bool)
+    # In pieces, because the numbers in between are several times as large as the mesh.
+    for first in range(0, len(faces), _PIECE):
+        piece = faces[first : first + _PIECE]
+        with np.errstate(all="ignore"):
+            a, b, c = (vertices[piece[:, corner]].astype(np.float64) for corner in range(3))
+            ab, ac, bc = b - a, c - a, c - b
+            longest = np.maximum(np.maximum((ab**2).sum(axis=1), (ac**2).sum(axis=1)), (bc**2).sum(axis=1))
+            area = np.linalg.norm(np.cross(ab, ac), axis=1)
+            found[first : first + _PIECE] = area > DEGENERATE * longest
+    return found
+
+
 def _repeated(
     vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int64], usable: npt.NDArray[np.bool_]
 ) -> npt.NDArray[np.bool_]:
     """(F,) which usable faces have the corner positions and the winding of an earlier one.
 
-    By position, not by index: formats without shared vertices repeat them too. Rotating the corners so
-    that the least comes first makes equal faces equal rows.
+    By position, not by index: formats without shared vertices repeat them too. Equal faces have equal
+    hashes, so that only the few that share theirs with another are compared.
     """
-    rows = np.ascontiguousarray(vertices + np.float32(0)).view(np.dtype((np.void, 12))).ravel()
-    _, place = np.unique(rows, return_inverse=True)
-    corners = place[faces[usable]]
-    turn = (corners.argmin(axis=1)[:, None] + np.arange(3)) % 3
-    corners = np.take_along_axis(corners, turn, axis=1)
-    # The sort is stable, so the first of equal faces comes first.
-    order = np.lexsort(corners.T)
-    again = np.zeros(len(corners), bool)
-    again[order[1:]] = np.all(corners[order[1:]] == corners[order[:-1]], axis=1)
+    hashes = _hashes(vertices, faces)
+    ordered = np.sort(hashes[usable])
+    shared = np.unique(ordered[1:][ordered[1:] == ordered[:-1]])
     result: npt.NDArray[np.bool_] = np.zeros(len(faces), bool)
-    result[usable] = again
+    if len(shared):
+        (places,) = np.nonzero(usable & np.isin(hashes, shared))
+        result[places] = _again(vertices[faces[places]])
     return result
+
+
+def _hashes(vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int64]) -> npt.NDArray[np.uint64]:
+    """(F,) the same for faces with the same positions in the same order, wherever it begins."""
+    # Adding zero makes one of the two zeros.
+    bits = (vertices + np.float32(0)).view(np.uint32).astype(np.uint64)
+    of_vertices = _mixed(_mixed(_mixed(bits[:, 0]) + bits[:, 1]) + bits[:, 2])
+    found = np.empty(len(faces), np.uint64)
+    for first in range(0, len(faces), _PIECE):
+        corners = of_vertices[faces[first : first + _PIECE]]
+        edges = _mixed(corners + np.uint64(3) * np.roll(corners, 1, axis=1))
+        found[first : first + _PIECE] = edges.sum(axis=1)
+    return found
+
+
+def _mixed(values: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
+    """SplitMix64's finalizer (Steele, Lea and Flood 2014)."""
+    values = (values ^ (values >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    values = (values ^ (values >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    mixed: npt.NDArray[np.uint64] = values ^ (values >> np.uint64(31))
+    return mixed
+
+
+def _again(corners: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
+    """(F,) which of (F, 3, 3) corners of faces, in their order, come earlier already."""
+    rows = np.ascontiguousarray(corners + np.float32(0)).view(np.dtype((np.void, 12)))
+    place = np.unique(rows, return_inverse=True)[1].reshape(-1, 3)
+    # With the least corner first, equal faces are equal rows.
+    turn = (place.argmin(axis=1)[:, None] + np.arange(3)) % 3
+    place = np.take_along_axis(place, turn, axis=1)
+    # The sort is stable, so the first of equal faces comes first.
+    order = np.lexsort(place.T)
+    again: npt.NDArray[np.bool_] = np.zeros(len(place), bool)
+    again[order[1:]] = np.all(place[order[1:]] == place[order[:-1]], axis=1)
+    return again
 
 
 def _corner_normals(
@@ -116,10 +161,13 @@ def _corner_normals(
 ) -> npt.NDArray[np.float32]:
     """(F, 3, 3) unit normals of (V, 3) normals at the vertices; a face's own where one has no direction."""
     with np.errstate(all="ignore"):
-        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-        unit = normals / lengths
-    usable = (np.isfinite(unit).all(axis=1) & (lengths[:, 0] > 1e-12))[faces]
-    corners = unit[faces]
+        lengths = np.linalg.norm(normals.astype(np.float64), axis=1, keepdims=True)
+        unit = (normals / lengths).astype(np.float32)
+    is_direction = np.isfinite(unit).all(axis=1) & (lengths[:, 0] > 1e-12)
+    corners = np.take(unit, faces, axis=0)
+    if is_direction.all():
+        return corners
+    usable = is_direction[faces]
     if not usable.all():
         a, b, c = (vertices[faces[:, corner]].astype(np.float64) for corner in range(3))
         flat = np.cross(b - a, c - a)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from incpt.core.arrays import handed_over
 from incpt.scene.checks import LARGEST
 
 Array = npt.NDArray[np.floating[Any]]
@@ -32,11 +33,15 @@ class VertexAttributes:
 
     def at_corners(self, faces: npt.NDArray[np.int64]) -> dict[str, Any]:
         """The keywords of a Mesh for faces (F, 3). Numbers that are not finite become 0."""
-        keywords: dict[str, Any] = {"uvs": tuple(_within(uv, LARGEST)[faces] for uv in self.uvs)}
+
+        def at(values: Array) -> Array:
+            return handed_over(np.take(values.astype(np.float32, copy=False), faces, axis=0))
+
+        keywords: dict[str, Any] = {"uvs": tuple(at(_within(uv, LARGEST)) for uv in self.uvs)}
         if self.colors is not None:
-            keywords["colors"] = np.clip(_within(self.colors, LARGEST), 0, 1)[faces]
+            keywords["colors"] = at(np.clip(_within(self.colors, LARGEST), 0, 1))
         if self.tangents is not None:
-            keywords["tangents"] = _unit_tangents(self.tangents)[faces]
+            keywords["tangents"] = at(_unit_tangents(self.tangents))
         return keywords
 
 

@@ -99,7 +99,9 @@ class Mesh:
     @cached_property
     def bounds(self) -> npt.NDArray[np.float32]:
         """(2, 3) least and greatest coordinates of the vertices that faces use, object space."""
-        used = self.vertices[self.faces.ravel()]
+        is_used = np.zeros(len(self.vertices), bool)
+        is_used[self.faces] = True
+        used = self.vertices[is_used]
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
 
