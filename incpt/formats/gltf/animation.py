@@ -47,7 +47,7 @@ def pose_at(time: float | None, document: Document, accessors: Accessors) -> Pos
                 if node >= count:
                     raise InputError(f"target.node: {node} is not among {count} nodes; the file is damaged")
                 if path in pose.get(node, {}):
-                    import_report.left_out(f"animation {label!r} of node {node}: another moves it too")
+                    import_report.left_out(f"part of animation {label!r}: another moves the same")
                     continue
                 sampler = animation.item("samplers", channel.whole("sampler", 0, 1 << 31))
                 fresh[node, path] = _sampled(sampler, path, time, accessors)

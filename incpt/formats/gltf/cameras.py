@@ -44,7 +44,7 @@ def camera_of(node: Node, document: Document, bounds: npt.NDArray[np.floating]) 
         else:
             # `xmag` is the picture's own aspect here, as `aspectRatio` is.
             values["ortho_height"] = 2 * max(abs(lens.number("ymag", 1.0)), 1e-6)
-        _tell_of_far_plane(lens.number("zfar", math.inf) if "zfar" in lens else math.inf, node, bounds, name)
+        _tell_of_far_plane(lens.number("zfar", math.inf, high=math.inf), node, bounds, name)
         where, target = tuple(position.tolist()), tuple((position - distance * back).tolist())
         return name, Camera(where, target, tuple(up.tolist()), **values)  # type: ignore[arg-type]
 

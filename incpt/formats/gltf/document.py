@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 from incpt.core.checks import described
-from incpt.core.errors import InputError, reason_of
+from incpt.core.errors import InputError, one_line, reason_of
 from incpt.core.files import read_bytes
 from incpt.formats import import_report
 from incpt.formats.gltf.table import Table
@@ -153,9 +153,10 @@ def _chunks(content: memoryview) -> tuple[memoryview, memoryview | None]:
 
 
 def _check_version(asset: Table) -> None:
-    version = asset.text("version")
+    # Older files have a number there.
+    version = str(asset.any("version") or "")
     if not re.match(r"2\.\d", version):
-        said = f"glTF {version}" if version else "no version of glTF"
+        said = f"glTF {one_line(version)[:20]}" if version else "no version of glTF"
         raise InputError(f"asset.version: says {said}; convert the file to glTF 2.0")
     least = asset.text("minVersion", "2.0")
     if least != "2.0":

@@ -170,7 +170,7 @@ def skinned(
 ) -> Triangles:
     """The triangles in world space, moved by joints (J, 4, 4), each of which takes points of the mesh at rest
     to the world. Linear blend skinning. Raises InputError."""
-    with primitive.in_messages():
+    with primitive.in_messages(), np.errstate(all="ignore"):
         matrices = _blended(primitive.table("attributes"), joints, len(base.positions), accessors)
     attributes = dict(base.attributes)
     linear = matrices[:, :, :3]

@@ -107,10 +107,13 @@ class _Parts:
         self._meshes: dict[object, Mesh | None] = {}
         self._names, self._labels = Names(), Names()
         self._joints: dict[int, npt.NDArray[np.float64]] = {}
+        self._without_area: dict[str, None] = {}
 
     def of(self, nodes: Sequence[Node]) -> tuple[MeshPart, ...]:
         """The parts that nodes show. Raises InputError where no face is left."""
         placed = [one for node in nodes if "mesh" in node.table for one in self._placed(node)]
+        if not placed and self._without_area:
+            raise InputError(f"has no usable face (no {' or '.join(self._without_area)} have area)")
         parts = [part for one in placed if (part := self._part(one)) is not None]
         tell_of_faces(self._counts)
         if len(placed) == 1:
@@ -136,7 +139,7 @@ class _Parts:
         number = node.table.whole("mesh", 0, 1 << 31)
         table = self._document.item("meshes", number)
         label = table.text("name") or f"mesh {number}"
-        shown = [one for one in table.tables("primitives") if _has_area(one, label)]
+        shown = [one for one in table.tables("primitives") if self._has_area(one, label)]
         skin = node.table.index("skin")
         if skin is not None:
             matrices, joints = np.eye(4)[None], self._joints_of(skin)
@@ -150,6 +153,15 @@ class _Parts:
                 name = self._names.new(node.name) if is_one else self._names.numbered(node.name)
                 mesh = label if len(shown) == 1 else f"{label}.{place}"
                 yield _Placed(name, mesh, primitive, matrix, node.is_visible, weights, skin, joints)
+
+    def _has_area(self, primitive: Table, label: str) -> bool:
+        kind = primitives.without_area(primitive)
+        if kind is not None:
+            self._without_area[kind] = None
+            import_report.left_out(f"{kind} of mesh {label!r}: have no area")
+        for name in primitives.unread_attributes(primitive):
+            import_report.left_out(f"{name} of mesh {label!r}: is a set of values more than are read")
+        return kind is None
 
     def _weights(self, node: Node, mesh: Table) -> tuple[float, ...]:
         posed = self._pose.get(node.number, {}).get("weights")
@@ -172,8 +184,10 @@ class _Parts:
                     stored = self._accessors.floats(inverse, 16).astype(np.float64)
                     if len(stored) < len(joints):
                         raise InputError("inverseBindMatrices: are fewer than joints; the file is damaged")
-                    # Matrices are stored column by column.
-                    joints = joints @ stored[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
+                    # Matrices are stored column by column. What is not finite ends in vertices that are
+                    # left out.
+                    with np.errstate(all="ignore"):
+                        joints = joints @ stored[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
             self._joints[number] = joints
         return self._joints[number]
 
@@ -207,15 +221,6 @@ class _Parts:
         if mesh is None:
             return None
         return replace(mesh, source=MeshSource(geometry=self._labels.new(placed.label)))
-
-
-def _has_area(primitive: Table, label: str) -> bool:
-    kind = primitives.without_area(primitive)
-    if kind is not None:
-        import_report.left_out(f"{kind} of mesh {label!r}: have no area")
-    for name in primitives.unread_attributes(primitive):
-        import_report.left_out(f"{name} of mesh {label!r}: is a set of values more than are read")
-    return kind is None
 
 
 def _geometry_key(primitive: Table) -> tuple[object, ...]:

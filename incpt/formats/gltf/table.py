@@ -23,7 +23,7 @@ class Table:
 
     def __init__(self, values: Any, place: str) -> None:
         if not isinstance(values, dict):
-            raise InputError(f"{place}: {described(values)} is no object; the file is damaged")
+            raise InputError(f"{place or 'JSON'}: {described(values)} is no object; the file is damaged")
         self._values = values
         self.place = place
 

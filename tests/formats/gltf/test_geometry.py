@@ -37,6 +37,12 @@ def area(mesh: Mesh) -> float:
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
+def test_a_file_of_lines_alone_says_so(tmp_path: Path) -> None:
+    builder = GltfBuilder()
+    with pytest.raises(InputError, match=r"has no usable face \(no lines have area\)"):
+        mesh_of(builder.write(tmp_path / "a.gltf", [builder.quad(mode=1)]))
+
+
 @pytest.mark.parametrize("suffix", ["gltf", "glb"])
 @pytest.mark.parametrize("is_indexed", [True, False])
 @pytest.mark.parametrize(

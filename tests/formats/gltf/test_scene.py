@@ -256,6 +256,7 @@ def test_what_is_left_out_is_told(tmp_path: Path) -> None:
         ({"asset": {"version": "1.0"}}, "says glTF 1.0; convert the file to glTF 2.0"),
         ({"asset": {"version": "2.1", "minVersion": "2.1"}}, "asks for glTF 2.1"),
         ({"asset": {}}, "says no version of glTF"),
+        ({"asset": {"version": 1}}, "says glTF 1; convert"),
     ],
 )
 def test_other_versions_and_unknown_requirements_are_refused(
