@@ -20,6 +20,7 @@ import numpy.typing as npt
 from incpt.core.checks import path_of, whole
 from incpt.core.errors import InputError, in_place, one_line
 from incpt.core.files import check_readable, write_atomically
+from incpt.formats import basis
 from incpt.formats.images import muted
 from incpt.scene.texture import BITMAP_MAX_SIZE, Bitmap, BitmapSource
 
@@ -83,6 +84,8 @@ def _pixels(path: Path) -> npt.NDArray[Any]:
     config.attribute("oiio:UnassociatedAlpha", 1)
     if path.suffix.lower() in (".glb", ".gltf"):
         raise InputError("may hold several images; name one by its number: `image = 0`")
+    if path.suffix.lower() == basis.SUFFIX:
+        return basis.pixels_of_ktx2(path.read_bytes())
     file = oiio.ImageInput.open(str(path), config)
     if file is None:
         raise InputError(

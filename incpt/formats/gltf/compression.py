@@ -35,7 +35,7 @@ def decoded_view(table: Table, document: Document) -> memoryview:
         content = document.content(table.whole("buffer", 0, 1 << 31))
         if first + length > len(content) or stride * count > _MOST_TIMES_LARGER * length:
             raise InputError(f"has {count} values in {length} bytes; the file is damaged")
-        decode = _library("meshopt", "is compressed by meshopt", "incpt[meshopt]").decode_gltf_buffer
+        decode = _library("meshopt", "is compressed by meshopt", "incpt[gltf]").decode_gltf_buffer
         code = bytes(content[first : first + length])
         rows = _decoded(lambda: decode(code, count, stride, mode, None if kind == "NONE" else kind))
         decoded = memoryview(np.ascontiguousarray(rows).tobytes())

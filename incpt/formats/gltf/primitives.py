@@ -156,7 +156,7 @@ def morphed(base: Triangles, primitive: Table, weights: Sequence[float], accesso
     for target, weight in zip(targets, weights, strict=False):
         if weight == 0:
             continue
-        with target.in_messages():
+        with target.in_messages(), np.errstate(all="ignore"):
             for name, moves in _attributes(target, _MORPHED_WIDTHS, accessors).items():
                 if name not in attributes or len(moves) != len(attributes[name]):
                     raise InputError(f"{name}: does not fit the mesh; the file is damaged")

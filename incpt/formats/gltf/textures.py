@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 from incpt.core.errors import InputError, in_place
-from incpt.formats import bitmaps, import_report
+from incpt.formats import basis, bitmaps, import_report
 from incpt.formats.gltf.accessors import Accessors
 from incpt.formats.gltf.document import Document
 from incpt.formats.gltf.table import Table
@@ -14,7 +14,7 @@ from incpt.scene.texture import UV_SETS, Bitmap, Texture
 
 _WRAPS = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
 _NEAREST = 9728
-_SUFFIXES = {"image/png": ".png", "image/jpeg": ".jpg", "image/webp": ".webp", "image/ktx2": ".ktx2"}
+_SUFFIXES = {"image/png": ".png", "image/jpeg": ".jpg", "image/webp": ".webp", "image/ktx2": basis.SUFFIX}
 _BASIS = "KHR_texture_basisu"
 
 
@@ -64,10 +64,7 @@ class Textures:
         uri = self._document.item("images", number).text("uri", "data:")
         if uri.startswith("data:"):
             return bitmaps.embedded(self._document.path, number, lambda: self.image(number))
-        file = self._document.file(uri)
-        if file.suffix.lower() == ".ktx2":
-            raise InputError(_NO_BASIS)
-        return bitmaps.load_bitmap(file)
+        return bitmaps.load_bitmap(self._document.file(uri))
 
     def image(self, number: int) -> tuple[bytes, str]:
         """The content of an image that the file holds, and the suffix of such files. Raises InputError."""
@@ -77,17 +74,10 @@ class Textures:
         else:
             read, kind = self._document.uri(table.text("uri"))
             content = memoryview(read)
-        suffix = _SUFFIXES.get(kind or table.text("mimeType"), ".png")
-        if suffix == ".ktx2":
-            raise InputError(_NO_BASIS)
-        return bytes(content), suffix
+        return bytes(content), _SUFFIXES.get(kind or table.text("mimeType"), ".png")
 
 
 _WRAP_KEYS = ("wrapS", "wrapT")
-_NO_BASIS = (
-    "is in Basis Universal (KTX2), which cannot be read; save it as PNG, JPEG or WebP, as "
-    "`gltf-transform webp` does"
-)
 
 
 def _source(texture: Table) -> int:

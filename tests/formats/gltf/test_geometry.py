@@ -263,7 +263,7 @@ def test_meshopt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         mesh_of(write_document(tmp_path / "b.gltf", document, content))
     without(monkeypatch, "meshopt")
     views[0]["extensions"]["EXT_meshopt_compression"]["count"] = 4
-    with pytest.raises(InputError, match=r"by meshopt; `pip install incpt\[meshopt\]`"):
+    with pytest.raises(InputError, match=r"by meshopt; `pip install incpt\[gltf\]`"):
         mesh_of(write_document(tmp_path / "c.gltf", document, content))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from support.gltf_files import GltfBuilder, write_document
 
 from incpt.core.errors import InputError, InputWarning
 from incpt.core.layout import TextureSlot
-from incpt.formats import bitmaps, mesh_files, scene_save
+from incpt.formats import basis, bitmaps, mesh_files, scene_save
 from incpt.formats.mesh_scene import scene_around
 from incpt.formats.registry import load
 from incpt.scene.material import texture_of
@@ -278,8 +279,7 @@ def test_an_image_that_cannot_be_read_is_left_out_and_told(tmp_path: Path) -> No
             "image 0: is",
         ),
         ("odd", {"uri": "data:image/png;base64,###"}, "image 0: "),
-        ("basis", {"uri": "a.ktx2"}, "Basis Universal .*`gltf-transform"),
-        ("typed", {"uri": "data:image/ktx2;base64,AAAA"}, "Basis Universal"),
+        ("basis", {"uri": "data:image/ktx2;base64,AAAA"}, "image 0: is no KTX2 image, or a damaged one"),
     ):
         writer = Writer()
         writer.more = {"images": [image], "textures": [{"source": 0}]}
@@ -288,6 +288,39 @@ def test_an_image_that_cannot_be_read_is_left_out_and_told(tmp_path: Path) -> No
         with pytest.warns(InputWarning, match=rf"^[^\n]*{name}.gltf: left out baseColor[^\n]*{words}[^\n]*$"):
             made = only_part(path).material
         assert made is not None and made.base_color_texture is None and made.roughness == 0.5
+
+
+def ktx2(color: tuple[int, int, int, int]) -> bytes:
+    """4 x 4 pixels of one colour, in UASTC: a block of mode 8 (code 0x17, 5 bits), then 8 bits a channel."""
+    bits = 0x17 | sum(value << 5 + 8 * channel for channel, value in enumerate(color))
+    sample = struct.pack("<HBBIII", 0, 127, 3, 0, 0, 0xFFFFFFFF)
+    # UASTC (166), BT.709, sRGB, blocks of 4 x 4 pixels in 16 bytes.
+    described = struct.pack("<IIHH16B", 44, 0, 2, 40, 166, 1, 2, 0, 3, 3, 0, 0, 16, *[0] * 7) + sample
+    header = struct.pack("<9I", 0, 1, 4, 4, 0, 0, 1, 1, 0) + struct.pack("<4I2Q", 104, 44, 0, 0, 0, 0)
+    level = struct.pack("<3Q", 160, 16, 16)
+    start = b"\xabKTX 20\xbb\r\n\x1a\n" + header + level + described
+    return start.ljust(160, b"\0") + bits.to_bytes(16, "little")
+
+
+def test_basis_universal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("opengl_basisu")
+    (tmp_path / "a.ktx2").write_bytes(ktx2((200, 100, 50, 255)))
+    writer = Writer()
+    texture = {"extensions": {"KHR_texture_basisu": {"source": 0}}}
+    writer.more = {"images": [{"uri": "a.ktx2"}], "textures": [texture]}
+    material = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
+    path = writer.write_gltf(tmp_path / "a.gltf", {"TEXCOORD_0": writer.accessor(UVS)}, material)
+    made = only_part(path).material
+    assert made is not None and made.base_color_texture is not None
+    pixels = made.base_color_texture.bitmap.pixels
+    assert pixels.shape == (4, 4, 4) and (pixels == [200, 100, 50, 255]).all()
+
+    def missing(name: str) -> Any:
+        raise ImportError(name)
+
+    monkeypatch.setattr("incpt.formats.basis.import_module", missing)
+    with pytest.raises(InputError, match=r"Basis Universal \(KTX2\); `pip install incpt\[gltf\]`"):
+        basis.pixels_of_ktx2(ktx2((0, 0, 0, 0)))
 
 
 def test_of_several_images_the_one_that_can_be_read_is_taken(tmp_path: Path) -> None:
