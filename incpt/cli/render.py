@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-    from incpt.formats.import_report import ImportReport
     from incpt.picture.denoise import NoiseGauge
     from incpt.render.session import Session, StepReport
     from incpt.scene.model import Scene
@@ -75,14 +75,19 @@ def render(
         ),
     ] = False,
     time: TimeOption = None,
+    frames: Annotated[
+        str | None,
+        typer.Option(
+            help="A sequence of pictures, such as 1-48: frame N shows N / fps seconds of animations."
+        ),
+    ] = None,
+    fps: Annotated[float, typer.Option(help="Frames per second of a sequence.", min=1e-3)] = 24.0,
     strict: StrictOption = False,
     allow_outside: OutsideOption = False,
     device: DeviceOption = None,
 ) -> None:
     """Render a scene to a picture. Ctrl-C keeps what is done."""
-    from incpt.formats import registry
     from incpt.picture import denoise as denoising
-    from incpt.render.export import write_picture
     from incpt.render.session import Session
 
     _check_picture_path(output)
@@ -90,16 +95,33 @@ def render(
         raise InputError(f"--aovs: {output} cannot hold them; use an .exr")
     if denoise:
         denoising.require_denoiser()
-    scene, report = registry.load_with_report(scene_file, time=time, allow_outside=allow_outside)
-    _complain_once(scene_file, scene, report, strict)
-    if camera is not None:
-        scene = scene.with_active_camera(camera)
-    settings = settings_from(scene, size=size, seed=seed, strategy=strategy, max_bounces=max_bounces)
-    settings = replace(settings, aovs=settings.aovs or aovs, transparent=settings.transparent or transparent)
-    with_aovs = settings.aovs
-    # Base colours and normals help a denoiser.
-    session = Session(scene, settings=replace(settings, aovs=with_aovs or denoise), device=device)
-    pixels, tally, gauge = padded_pixels(settings), _Tally(), denoising.NoiseGauge()
+    shots = [(output, time)] if frames is None else _shots(output, frames, fps, time)
+    session: Session | None = None
+    for path, moment in shots:
+        scene = _scene(scene_file, moment, strict, allow_outside, is_first=session is None)
+        scene = scene if camera is None else scene.with_active_camera(camera)
+        if session is None:
+            settings = settings_from(scene, size=size, seed=seed, strategy=strategy, max_bounces=max_bounces)
+            settings = replace(
+                settings, aovs=settings.aovs or aovs, transparent=settings.transparent or transparent
+            )
+            with_aovs = settings.aovs
+            if frames is not None:
+                # They are pictures of their own: nothing of the one before is kept.
+                settings = replace(settings, strategy="restart")
+            # Base colours and normals help a denoiser.
+            session = Session(scene, settings=replace(settings, aovs=with_aovs or denoise), device=device)
+        else:
+            session.edit(_seen_as(session.scene, scene))
+        _render_picture(session, path, spp, with_aovs, denoise)
+
+
+def _render_picture(session: Session, output: Path, spp: int, with_aovs: bool, denoise: bool) -> None:
+    """Raises Stopped after Ctrl-C, with what is done in the file."""
+    from incpt.picture import denoise as denoising
+    from incpt.render.export import write_picture
+
+    pixels, tally, gauge = padded_pixels(session.settings), _Tally(), denoising.NoiseGauge()
     with interruption() as stop, path_progress("rendering", spp * pixels, pixels) as progress:
 
         def on_step(report: StepReport) -> None:
@@ -124,20 +146,43 @@ def render(
         raise Stopped(f"stopped at {samples} of {spp} samples per pixel")
 
 
-def _complain_once(file: Path, scene: Scene, report: ImportReport, strict: bool) -> None:
-    """Warns of a picture that shows nothing, and of what is left out of it: once, and in short. Raises
-    InputError for the latter where that is asked for."""
+def _seen_as(first: Scene, scene: Scene) -> Scene:
+    """A later scene of a sequence. A file without a camera of its own is framed anew at each time, which
+    would hold what moves in the middle: it is seen as in the first picture."""
+    from incpt.scene.model import CAMERA_NAME
+
+    return replace(scene, camera=first.camera) if list(scene.cameras) == [CAMERA_NAME] else scene
+
+
+def _shots(output: Path, frames: str, fps: float, time: float | None) -> list[tuple[Path, float | None]]:
+    """The file and the time of each frame of a sequence. Raises InputError."""
+    match = re.fullmatch(r"(\d{1,6})-(\d{1,6})", frames.strip())
+    if match is None or int(match[1]) > int(match[2]):
+        raise InputError(f"--frames: {frames!r} is no first and last frame; write them like 1-48")
+    if time is not None:
+        raise InputError("--time: stands beside --frames; give one or the other")
+    numbers = range(int(match[1]), int(match[2]) + 1)
+    return [(output.with_suffix(f".{number:04d}{output.suffix}"), number / fps) for number in numbers]
+
+
+def _scene(file: Path, time: float | None, strict: bool, allow_outside: bool, is_first: bool) -> Scene:
+    """The scene of a file. Warns, if it is the first, of a picture that shows nothing and of what is left out
+    of it: once, and in short. Raises InputError for the latter where that is asked for."""
+    from incpt.formats import registry
     from incpt.formats.import_report import Fate
     from incpt.scene import summary
 
+    scene, report = registry.load_with_report(file, time=time, allow_outside=allow_outside)
     if strict:
         report.check_whole()
-    for problem in summary.scene_problems(scene):
-        complain(f"warning: {file}: {problem}", 0)
-    lost = report.of(Fate.LEFT_OUT)
-    for remark in lost[:1]:
-        more = f" (and {len(lost) - 1:,} more; `incpt check` tells all)" if len(lost) > 1 else ""
-        complain(f"warning: {remark}{more}", 0)
+    if is_first:
+        for problem in summary.scene_problems(scene):
+            complain(f"warning: {file}: {problem}", 0)
+        lost = report.of(Fate.LEFT_OUT)
+        for remark in lost[:1]:
+            more = f" (and {len(lost) - 1:,} more; `incpt check` tells all)" if len(lost) > 1 else ""
+            complain(f"warning: {remark}{more}", 0)
+    return scene
 
 
 @dataclass

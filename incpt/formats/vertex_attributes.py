@@ -27,8 +27,9 @@ class VertexAttributes:
         """Under a (3, 3) matrix."""
         if self.tangents is None:
             return self
-        along = self.tangents[:, :3] @ linear.T
-        side = self.tangents[:, 3:] * np.sign(np.linalg.det(linear))
+        with np.errstate(all="ignore"):
+            along = self.tangents[:, :3] @ linear.T
+            side = self.tangents[:, 3:] * np.sign(np.linalg.det(linear))
         return replace(self, tangents=np.concatenate([along, side], axis=1))
 
     def at_corners(self, faces: npt.NDArray[np.int64]) -> dict[str, Any]:

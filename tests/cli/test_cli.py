@@ -390,6 +390,37 @@ def test_strict_refuses_what_is_not_read_whole(
 
 
 @pytest.mark.slow
+def test_frames_are_the_pictures_of_their_times(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A quad moves by a morph target, so that its mesh is another one in each frame, with the same faces. It
+    is seen through a camera of the file; without one, as in the first frame."""
+    quad = {**QUAD, "targets": [{"POSITION": GLTF.accessor(np.float32([[0, 1, 0]] * 4))}]}
+    times, weights = (GLTF.accessor(np.float32(values)) for values in ([0, 1], [0, 1]))
+    channel = {"sampler": 0, "target": {"node": 0, "path": "weights"}}
+    more = {
+        "meshes": [{"primitives": [quad], "weights": [0]}],
+        "animations": [{"samplers": [{"input": times, "output": weights}], "channels": [channel]}],
+    }
+    seen = {
+        "nodes": [{"mesh": 0}, {"camera": 0, "name": "camera", "translation": [0, 0, 5]}],
+        "scenes": [{"nodes": [0, 1]}],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 0.8, "znear": 0.1}}],
+    }
+    options = ("--spp", 2, "--size", "16x16")
+    for name, camera in (("seen", seen), ("framed", {})):
+        path = GLTF.write(tmp_path / f"{name}.glb", [quad], **more, **camera)
+        assert run("render", path, "-o", tmp_path / "f.exr", "--frames", "0-2", "--fps", 2, *options) == 0
+        frames = [read_exr(tmp_path / f"f.000{number}.exr") for number in range(3)]
+        assert run("render", path, "-o", tmp_path / "t.exr", "--time", 1, *options) == 0
+        assert not np.array_equal(frames[0], frames[2])
+        assert np.array_equal(read_exr(tmp_path / "t.exr"), frames[2]) == (name == "seen")
+    capsys.readouterr()
+    for wrong, said in (("4-2", "is no first and last frame"), ("all", "is no first"), ("1-2", "--time: ")):
+        time = ("--time", 1) if wrong == "1-2" else ()
+        assert run("render", path, "-o", tmp_path / "f.exr", "--frames", wrong, *time) == 2
+        assert said in only_line(capsys.readouterr().err)
+
+
+@pytest.mark.slow
 def test_render_tells_once_what_is_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = gltf_file(tmp_path)
     assert run("render", path, "-o", tmp_path / "a.png", "--spp", 1, "--size", "8x8") == 0

@@ -24,7 +24,7 @@ def camera_of(node: Node, document: Document, bounds: npt.NDArray[np.floating]) 
     if number is None:
         return None
     table = document.item("cameras", number)
-    name = node.table.text("name") or table.text("name") or "camera"
+    name = node.table.text("name") or table.text("name") or f"camera {number}"
     with in_place(f"camera {name!r}"):
         kind = table.text("type")
         one_of("type", kind, ("perspective", "orthographic"))

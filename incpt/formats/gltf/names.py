@@ -4,10 +4,10 @@ from __future__ import annotations
 
 
 class Names:
-    """Gives each name once; counts on where one is used already."""
+    """Gives each name once, and those that are `taken` never; counts on where one is used already."""
 
-    def __init__(self) -> None:
-        self._used: set[str] = set()
+    def __init__(self, *taken: str) -> None:
+        self._used = set(taken)
         self._counts: dict[str, int] = {}
 
     def new(self, wanted: str) -> str:

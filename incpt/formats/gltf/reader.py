@@ -32,6 +32,7 @@ from incpt.formats.placement import placed_arrays
 from incpt.scene.camera import Camera
 from incpt.scene.mesh import Mesh, MeshSource
 from incpt.scene.mesh_part import MeshFile, MeshPart
+from incpt.scene.model import CAMERA_NAME
 from incpt.scene.transform import IDENTITY, Transform
 
 _SAME = 1e-9
@@ -49,7 +50,8 @@ def read_gltf(path: Path) -> MeshFile:
     bounds = _bounds(parts)
     lights = tuple(light for node in in_scene if (light := light_of(node, document)) is not None)
     cameras: dict[str, Camera] = {}
-    names = Names()
+    # Under the name that is left out stands the camera of files that have none.
+    names = Names(CAMERA_NAME)
     for node in in_scene:
         found = camera_of(node, document, bounds)
         if found is not None:

@@ -17,6 +17,7 @@ from support.gltf_files import QUAD, QUAD_FACES, GltfBuilder, write_document
 
 from incpt.core.errors import InputError, InputWarning
 from incpt.formats import mesh_files
+from incpt.formats.gltf.accessors import as_floats
 from incpt.formats.gltf.nodes import composed
 from incpt.scene.mesh import Mesh
 
@@ -102,6 +103,14 @@ def test_quantised_positions(tmp_path: Path) -> None:
             extensionsRequired=["KHR_mesh_quantization"],
         )
         np.testing.assert_allclose(corners(mesh_of(path)), CORNERS * factor, atol=1e-6)
+
+
+def test_normalised_numbers_reach_from_minus_one_to_one() -> None:
+    for kind in (np.int8, np.int16, np.uint8, np.uint16):
+        largest, least = np.iinfo(kind).max, np.iinfo(kind).min
+        found = as_floats(np.array([least, -largest if least else 0, 0, largest], kind), True)
+        assert found.tolist() == ([-1, -1, 0, 1] if least else [0, 0, 0, 1])
+        assert as_floats(np.array([largest], kind), False) == [largest]
 
 
 def test_interleaved_and_sparse(tmp_path: Path) -> None:
