@@ -72,6 +72,10 @@ class ImportReport:
         return lines
 
 
+NOTHING_TOLD = ImportReport()
+"""Of what was read from no file."""
+
+
 class Gathered:
     """What is told while files are read."""
 

@@ -105,11 +105,16 @@ def load(path: str | os.PathLike[str], *, time: float | None = None, allow_outsi
     nothing. Raises InputError, one line that names file, table and key.
     """
     scene, report = load_with_report(path, time=time, allow_outside=allow_outside)
-    for remark in report.of(Fate.LEFT_OUT):
-        warnings.warn(str(remark), InputWarning, stacklevel=2)
-    for problem in scene_problems(scene):
-        warnings.warn(f"{path}: {problem}", InputWarning, stacklevel=2)
+    for complaint in complaints(path, scene, report):
+        warnings.warn(complaint, InputWarning, stacklevel=2)
     return scene
+
+
+def complaints(path: str | os.PathLike[str], scene: Scene, report: ImportReport) -> list[str]:
+    """What a user has to know of a scene that was read: what was left out of it, and what makes its picture
+    empty or black; a line each."""
+    lost = [str(remark) for remark in report.of(Fate.LEFT_OUT)]
+    return lost + [f"{os.fspath(path)}: {problem}" for problem in scene_problems(scene)]
 
 
 def load_with_report(

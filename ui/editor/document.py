@@ -11,6 +11,7 @@ from pathlib import Path
 
 from incpt.core.errors import InputError, InputWarning, one_line
 from incpt.formats import registry, scene_save
+from incpt.formats.import_report import NOTHING_TOLD, ImportReport
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
 from incpt.scene.history import History
@@ -26,7 +27,8 @@ UNTITLED = "untitled"
 
 class Document:
     """A scene under edit. `path` is its scene file, or None while it has none; `warnings` are what came up
-    while it was read, a line each; `first_scene` is what it began with."""
+    while it was read, a line each, and `report` is what became of its files; `first_scene` is what it began
+    with."""
 
     def __init__(
         self,
@@ -35,11 +37,13 @@ class Document:
         *,
         name: str = UNTITLED,
         warnings: tuple[str, ...] = (),
+        report: ImportReport = NOTHING_TOLD,
         is_saved: bool = True,
     ) -> None:
         self.history = History(scene)
         self.path = path
         self.warnings = warnings
+        self.report = report
         self.first_scene = scene
         self._name = name
         self._saved: Scene | None = scene if is_saved else None
@@ -65,11 +69,11 @@ class Document:
     def open(cls, path: str | os.PathLike[str]) -> Document:
         """A document from a scene file, or an untitled one around a mesh file. Raises InputError."""
         absolute = absolute_path(path)
-        with collected_warnings() as messages:
-            scene = registry.load(absolute)
+        scene, report = registry.load_with_report(absolute)
+        warnings = tuple(map(one_line, registry.complaints(absolute, scene, report)))
         is_scene = absolute.suffix.lower() == SUFFIX
         name = absolute.name if is_scene else absolute.stem
-        return cls(scene, absolute if is_scene else None, name=name, warnings=tuple(messages))
+        return cls(scene, absolute if is_scene else None, name=name, warnings=warnings, report=report)
 
     @property
     def scene(self) -> Scene:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core.checks import one_of
-from incpt.core.errors import InputError, in_place
+from incpt.core.errors import in_place
 from incpt.formats import import_report
 from incpt.formats.gltf.document import Document
 from incpt.formats.gltf.nodes import Node
@@ -25,15 +25,15 @@ def camera_of(node: Node, document: Document, bounds: npt.NDArray[np.floating]) 
         return None
     table = document.item("cameras", number)
     name = node.table.text("name") or table.text("name") or f"camera {number}"
+    if node.flattens:
+        import_report.left_out(f"camera {name!r}: stands at a node that flattens space")
+        return None
     with in_place(f"camera {name!r}"):
         kind = table.text("type")
         one_of("type", kind, ("perspective", "orthographic"))
         lens = table.table(kind)
-        with np.errstate(all="ignore"):
-            back, up = (node.world[:3, axis] / np.linalg.norm(node.world[:3, axis]) for axis in (2, 1))
+        back, up = (node.world[:3, axis] / np.linalg.norm(node.world[:3, axis]) for axis in (2, 1))
         position = node.world[:3, 3]
-        if not np.isfinite([back, up]).all():
-            raise InputError("stands at a node that flattens space; give it a scale")
         # In the middle of what there is to see, so that a view turns about it.
         distance = float((bounds.mean(axis=0) - position) @ -back)
         if distance <= 1e-3 * float(np.linalg.norm(bounds[1] - bounds[0])):

@@ -11,11 +11,9 @@ import math
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from incpt.core import affine
 from incpt.core.checks import one_of
-from incpt.core.errors import InputError, in_place
+from incpt.core.errors import in_place
 from incpt.formats import import_report
 from incpt.formats.gltf.document import Document
 from incpt.formats.gltf.nodes import Node
@@ -27,13 +25,16 @@ _KINDS = {"point": "point", "spot": "spot", "directional": "sun"}
 
 
 def light_of(node: Node, document: Document) -> Light | None:
-    """The light that a node carries, in world space, without a size; it need not have a name of its own.
-    Raises InputError."""
+    """The light that a node carries, in world space, without a size; it need not have a name of its own. None
+    where there is none, or where the node flattens space. Raises InputError."""
     carried = node.table.extension(EXTENSION)
     number = carried.index("light")
     if number is None:
         return None
     table = document.root.table("extensions").table(EXTENSION).item("lights", number)
+    if node.flattens:
+        import_report.left_out(f"light {node.name!r}: stands at a node that flattens space")
+        return None
     with in_place(f"light {node.name!r}"):
         if "range" in table:
             import_report.left_out(f"the range of light {node.name!r}: light has none")
@@ -44,10 +45,7 @@ def _light(table: Table, node: Node) -> Light:
     kind = table.text("type")
     one_of("type", kind, _KINDS)
     kind = _KINDS[kind]
-    try:
-        position, rotation, _ = affine.decompose(node.world[:3])
-    except np.linalg.LinAlgError:
-        raise InputError("stands at a node that flattens space; give it a scale") from None
+    position, rotation, _ = affine.decompose(node.world[:3])
     intensity = table.number("intensity", 1.0, 0.0, LARGEST_STRENGTH)
     values: dict[str, Any] = {
         "color": table.numbers("color", (1.0, 1.0, 1.0), -math.inf),

@@ -19,6 +19,8 @@ from incpt.scene.checks import LARGEST
 Matrix = npt.NDArray[np.float64]
 Pose = Mapping[int, Mapping[str, npt.NDArray[np.float64]]]
 """By the number of a node and the name of its property, what an animation says in place of the file."""
+_FLAT = 1e-6
+"""The volume that axes of unit length span below which they lie in a plane."""
 INSTANCING = "EXT_mesh_gpu_instancing"
 _PROPERTIES: dict[str, tuple[float, ...]] = {
     "translation": (0.0, 0.0, 0.0),
@@ -38,6 +40,13 @@ class Node:
     name: str
     world: Matrix
     is_visible: bool
+
+    @property
+    def flattens(self) -> bool:
+        """Whether nothing that has directions can stand there."""
+        with np.errstate(all="ignore"):
+            axes = self.world[:3, :3] / np.linalg.norm(self.world[:3, :3], axis=0)
+        return not bool(np.isfinite(axes).all() and abs(np.linalg.det(axes)) > _FLAT)
 
 
 class Nodes:

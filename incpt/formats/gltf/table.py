@@ -115,7 +115,8 @@ class Table:
         value = self._values.get(key, default)
         if not isinstance(value, str):
             raise InputError(f"{self._at(key)}: {described(value)} is no text; the file is damaged")
-        return value
+        # JSON may escape halves of characters, which no file and no terminal can be given.
+        return value.encode("utf-8", "replace").decode()
 
     def flag(self, key: str, default: bool = False) -> bool:
         """True or false."""

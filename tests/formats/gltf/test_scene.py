@@ -179,6 +179,13 @@ def test_meshes_of_a_file_are_added_where_they_stand(tmp_path: Path) -> None:
     assert bounds[:, :, 0].mean() != 0 and (bounds[:, 0, 0].min() + bounds[:, 1, 0].max()) / 2 == 10
 
 
+def test_names_that_are_no_text_can_be_saved(tmp_path: Path) -> None:
+    scene, _ = read(write(tmp_path / "a.gltf", [{"mesh": 0, "name": "\ud800 x"}, {"mesh": 0, "name": "a\nb"}],
+                          scenes=[{"nodes": [0, 1]}]))  # fmt: skip
+    assert [o.name for o in scene.objects] == ["a/? x", "a/a\nb"]
+    assert saved_and_loaded(scene, tmp_path) == scene
+
+
 # ------------------------------------------------------------------------------------------ cameras, lamps
 
 CAMERA = {"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.01, "zfar": 3.0}}
@@ -210,6 +217,26 @@ def test_cameras_and_lamps_are_used_as_they_are(tmp_path: Path) -> None:
     assert scene.environment.radiance == (0, 0, 0)
     assert lost(report) == ["the far plane of camera 'front': what is behind it is seen"]
     assert saved_and_loaded(scene, tmp_path) == scene
+
+
+def test_what_stands_at_a_flattened_node_is_left_out(tmp_path: Path) -> None:
+    lamp = {"extensions": {"KHR_lights_punctual": {"light": 0}}}
+    nodes = [
+        {"mesh": 0},
+        {"name": "gone", "scale": [0, 0, 0], "children": [2, 3]},
+        {"camera": 0, "name": "eye"},
+        {"name": "lamp", **lamp},
+    ]
+    path = write(
+        tmp_path / "a.gltf", nodes, scenes=[{"nodes": [0, 1]}], cameras=[CAMERA],
+        extensions={"KHR_lights_punctual": {"lights": [{"type": "point"}]}},
+    )  # fmt: skip
+    scene, report = read(path)
+    assert not scene.lights and list(scene.cameras) == ["camera"] and scene.environment.image is not None
+    assert lost(report) == [
+        "light 'lamp': stands at a node that flattens space",
+        "camera 'eye': stands at a node that flattens space",
+    ]
 
 
 def test_without_light_and_camera_it_stands_in_a_studio_and_is_framed(tmp_path: Path) -> None:

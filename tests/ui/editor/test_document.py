@@ -92,6 +92,8 @@ def test_a_mesh_file_opens_as_an_untitled_scene_and_tells_what_it_lost(tmp_path:
     document = Document.open(path)
     assert document.path is None and document.name == "tri" and not document.is_dirty
     assert len(document.warnings) == 1 and "tri.obj" in document.warnings[0]
+    (remark,) = document.report.remarks
+    assert document.warnings == (str(remark),) and remark.file == str(path)
 
 
 def test_what_cannot_be_opened_says_why(tmp_path: Path) -> None:
