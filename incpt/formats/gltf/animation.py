@@ -1,6 +1,8 @@
-"""Animations of glTF files: what they say of nodes at a time."""
+"""Animations of glTF files: what they say at a time is put into the JSON, in place of what the file says."""
 
 from __future__ import annotations
+
+import re
 
 import numpy as np
 import numpy.typing as npt
@@ -10,12 +12,13 @@ from incpt.core.errors import InputError
 from incpt.formats import import_report
 from incpt.formats.gltf.accessors import Accessors
 from incpt.formats.gltf.document import Document
-from incpt.formats.gltf.nodes import Pose
 from incpt.formats.gltf.table import Table
 from incpt.scene.checks import LARGEST
 
+_POINTER = "KHR_animation_pointer"
 _WIDTHS = {"translation": 3, "rotation": 4, "scale": 3, "weights": 1}
-"""Numbers of each property; weights are as many as there are morph targets."""
+"""Numbers of each property of a node; weights are as many as there are morph targets."""
+_MOVABLE = re.compile(r"/(nodes|materials|cameras|meshes|extensions)/.+")
 _INTERPOLATIONS = ("LINEAR", "STEP", "CUBICSPLINE")
 _NEARLY_ALIKE = 0.9995
 """Cosine of half an angle between rotations above which a straight line is as good as an arc."""
@@ -23,77 +26,84 @@ _NEARLY_ALIKE = 0.9995
 Array = npt.NDArray[np.float64]
 
 
-def pose_at(time: float | None, document: Document, accessors: Accessors) -> Pose:
-    """What the animations of a file say, `time` seconds after they began; nothing where it is None. All run
-    at once; where two move the same property, the first does. Raises InputError."""
+def animate(time: float | None, document: Document, accessors: Accessors) -> None:
+    """Puts what the animations of a file say, `time` seconds after they began, into its JSON; nothing where
+    it is None. All run at once; where two move the same property, the first does. Raises InputError."""
     animations = list(document.root.tables("animations"))
     if time is None:
         if animations:
             what = "1 animation" if len(animations) == 1 else f"{len(animations)} animations"
             import_report.left_out(f"{what}: nothing moves without --time (`time` in Python)")
-        return {}
-    pose: dict[int, dict[str, Array]] = {}
-    count = len(document.root.entries("nodes"))
+        return
+    moved: dict[str, float | bool | list[float]] = {}
     for animation in animations:
         label = animation.text("name") or animation.place
-        fresh: dict[tuple[int, str], Array] = {}
+        fresh = {}
         for channel in animation.tables("channels"):
             with channel.in_messages():
-                target = channel.table("target")
-                path, node = target.text("path"), target.index("node")
-                if path not in _WIDTHS or node is None:
-                    import_report.left_out(f"{path or 'a channel'} of animation {label!r}: cannot be moved")
-                    continue
-                if node >= count:
-                    raise InputError(f"target.node: {node} is not among {count} nodes; the file is damaged")
-                if path in pose.get(node, {}):
+                pointer = _pointer(channel.table("target"), document)
+                if pointer is None:
+                    import_report.left_out(f"part of animation {label!r}: moves what cannot be moved")
+                elif pointer in moved:
                     import_report.left_out(f"part of animation {label!r}: another moves the same")
-                    continue
-                sampler = animation.item("samplers", channel.whole("sampler", 0, 1 << 31))
-                fresh[node, path] = _sampled(sampler, path, time, accessors)
-        for (node, path), value in fresh.items():
-            pose.setdefault(node, {})[path] = value
-    return _complete(pose, document)
+                else:
+                    sampler = animation.item("samplers", channel.whole("sampler", 0, 1 << 31))
+                    fresh[pointer] = _value(pointer, _sampled(sampler, pointer, time, accessors))
+        moved |= fresh
+    for pointer, value in moved.items():
+        document.put(pointer, value)
 
 
-def _complete(pose: dict[int, dict[str, Array]], document: Document) -> Pose:
-    """Without those whose nodes stand by a matrix, which glTF forbids to be animated."""
-    for node, properties in pose.items():
-        table = document.item("nodes", node)
-        if "matrix" in table and properties.keys() - {"weights"}:
-            raise InputError(f"{table.place}: stands by a matrix and is animated; the file is damaged")
-    return pose
+def _pointer(target: Table, document: Document) -> str | None:
+    """The JSON pointer (RFC 6901) to what a channel moves; None where that cannot be. Raises InputError."""
+    path, node = target.text("path"), target.index("node")
+    if path == "pointer":
+        pointer = target.extension(_POINTER).text("pointer")
+        return pointer if _MOVABLE.fullmatch(pointer) else None
+    if path not in _WIDTHS or node is None:
+        return None
+    count = len(document.root.entries("nodes"))
+    if node >= count:
+        raise InputError(f"target.node: {node} is not among {count} nodes; the file is damaged")
+    if path != "weights" and "matrix" in document.item("nodes", node):
+        raise InputError(f"target.node: {node} stands by a matrix and is animated; the file is damaged")
+    return f"/nodes/{node}/{path}"
 
 
-def _sampled(sampler: Table, path: str, time: float, accessors: Accessors) -> Array:
-    """The value of a property at a time. Raises InputError."""
+def _value(pointer: str, numbers: Array) -> float | bool | list[float]:
+    """Numbers as the JSON has them at a pointer."""
+    if pointer.endswith("/weights") or len(numbers) > 1:
+        return [float(number) for number in numbers]
+    return bool(numbers[0] != 0) if pointer.endswith("/visible") else float(numbers[0])
+
+
+def _sampled(sampler: Table, pointer: str, time: float, accessors: Accessors) -> Array:
+    """The numbers of a property at a time. Raises InputError."""
     kind = sampler.text("interpolation", "LINEAR")
     with sampler.in_messages():
         one_of("interpolation", kind, _INTERPOLATIONS)
         times = accessors.floats(sampler.whole("input", 0, 1 << 31), 1)[:, 0].astype(np.float64)
-        raw = accessors.floats(sampler.whole("output", 0, 1 << 31), _WIDTHS[path]).astype(np.float64)
+        raw = accessors.floats(sampler.whole("output", 0, 1 << 31), 1, 2, 3, 4).astype(np.float64)
         if not (np.isfinite(times).all() and np.isfinite(raw).all() and (np.diff(times) > 0).all()):
             raise InputError("holds times that do not grow, or a number that is not finite")
-        values = np.clip(raw, -LARGEST, LARGEST)
         per_key = 3 if kind == "CUBICSPLINE" else 1
-        width = len(values) // (len(times) * per_key) * _WIDTHS[path]
-        if (
-            width == 0
-            or len(times) * per_key * width != values.size
-            or (path != "weights" and width != _WIDTHS[path])
-        ):
-            raise InputError(f"has {len(values)} values for {len(times)} times; the file is damaged")
-        keys = values.reshape(len(times), per_key, width)
+        width = raw.size // (len(times) * per_key)
+        name = pointer.rsplit("/", 1)[1] if pointer.startswith("/nodes/") else ""
+        # Weights are as many as there are morph targets.
+        fits = name == "weights" or width == _WIDTHS.get(name, raw.shape[1])
+        if not fits or width == 0 or len(times) * per_key * width != raw.size:
+            raise InputError(f"has {len(raw)} values for {len(times)} times; the file is damaged")
+        keys = np.clip(raw, -LARGEST, LARGEST).reshape(len(times), per_key, width)
     after = int(np.searchsorted(times, time, side="right"))
     if after == 0 or after == len(times):
         # Before the first key and behind the last their values stay.
         found: Array = keys[min(after, len(times) - 1), per_key // 2]
-    else:
-        found = _between(keys[after - 1], keys[after], times[after - 1 : after + 1], time, kind, path)
-    return found
+        return found
+    is_rotation = name == "rotation"
+    return _between(keys[after - 1], keys[after], times[after - 1 : after + 1], time, kind, is_rotation)
 
 
-def _between(a: Array, b: Array, times: Array, time: float, kind: str, path: str) -> Array:
+def _between(a: Array, b: Array, times: Array, time: float, kind: str, is_rotation: bool) -> Array:
     """Between two keys; appendix C of the specification of glTF 2.0."""
     start, length = float(times[0]), float(times[1] - times[0])
     t = (time - start) / length
@@ -105,7 +115,7 @@ def _between(a: Array, b: Array, times: Array, time: float, kind: str, path: str
     first: Array = a[0]
     if kind == "STEP":
         return first
-    return _slerp(first, b[0], t) if path == "rotation" else (1 - t) * first + t * b[0]
+    return _slerp(first, b[0], t) if is_rotation else (1 - t) * first + t * b[0]
 
 
 def _slerp(a: Array, b: Array, t: float) -> Array:

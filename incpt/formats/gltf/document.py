@@ -30,6 +30,7 @@ EXTENSIONS = (
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
+    "KHR_animation_pointer",
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_variants",
@@ -56,7 +57,8 @@ class Document:
         self._binary: memoryview | None = None
         if path.suffix.lower() == ".glb":
             content, self._binary = _chunks(content)
-        self.root = Table(_parsed(content, path), "")
+        self._json = _parsed(content, path)
+        self.root = Table(self._json, "")
         _check_version(self.root.table("asset"))
         self._buffers: dict[int, memoryview] = {}
 
@@ -75,6 +77,21 @@ class Document:
         listed = [name for name in self.root.entries("extensionsUsed") if isinstance(name, str)]
         for name in sorted({*listed, *_used(self.root)} - {*EXTENSIONS}):
             import_report.left_out(f"the extension {name}: is unknown here")
+
+    def put(self, pointer: str, value: object) -> None:
+        """Puts a value into the JSON, where a JSON pointer (RFC 6901) says; objects on the way that are not
+        there are made. Raises InputError."""
+        *steps, last = [step.replace("~1", "/").replace("~0", "~") for step in pointer.split("/")[1:]]
+        owner: Any = self._json
+        for step in steps:
+            if isinstance(owner, dict):
+                owner = owner.setdefault(step, {})
+            else:
+                owner = owner[_place_in(owner, step, pointer)]
+        if isinstance(owner, dict):
+            owner[last] = value
+        else:
+            owner[_place_in(owner, last, pointer)] = value
 
     def content(self, number: int) -> memoryview:
         """A buffer, at least as long as it says. Raises InputError."""
@@ -120,6 +137,13 @@ class Document:
     def item(self, kind: str, number: int) -> Table:
         """An entry of one of the lists of the file, such as "meshes". Raises InputError."""
         return self.root.item(kind, number)
+
+
+def _place_in(values: Any, step: str, pointer: str) -> int:
+    """The place in a list to which a step of a pointer leads. Raises InputError."""
+    if isinstance(values, list) and re.fullmatch(r"\d{1,9}", step) and int(step) < len(values):
+        return int(step)
+    raise InputError(f"pointer {described(pointer)}: leads to nothing; the file is damaged")
 
 
 def _parsed(content: memoryview, path: Path) -> Any:

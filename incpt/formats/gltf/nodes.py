@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +16,6 @@ from incpt.formats.gltf.table import Table
 from incpt.scene.checks import LARGEST
 
 Matrix = npt.NDArray[np.float64]
-Pose = Mapping[int, Mapping[str, npt.NDArray[np.float64]]]
-"""By the number of a node and the name of its property, what an animation says in place of the file."""
 _FLAT = 1e-6
 """The volume that axes of unit length span below which they lie in a plane."""
 INSTANCING = "EXT_mesh_gpu_instancing"
@@ -50,9 +47,9 @@ class Node:
 
 
 class Nodes:
-    """All nodes of a file in a pose."""
+    """All nodes of a file."""
 
-    def __init__(self, document: Document, pose: Pose) -> None:
+    def __init__(self, document: Document) -> None:
         """Raises InputError: a node below itself or below two others, or one that is not there."""
         self._document = document
         self._tables = list(document.root.tables("nodes"))
@@ -61,7 +58,7 @@ class Nodes:
         self.worlds: list[Matrix] = [np.eye(4)] * len(self._tables)
         """(4, 4) for each node."""
         self._visible = [True] * len(self._tables)
-        self._place(pose)
+        self._place()
 
     def _checked(self, numbers: list[int], place: str) -> list[int]:
         for number in numbers:
@@ -69,7 +66,7 @@ class Nodes:
                 raise InputError(f"{place}: names node {number} of {len(self._tables)}; the file is damaged")
         return numbers
 
-    def _place(self, pose: Pose) -> None:
+    def _place(self) -> None:
         below = [child for children in self._children for child in children]
         if len(set(below)) < len(below):
             raise InputError("nodes: one stands below two others; the file is damaged")
@@ -80,7 +77,7 @@ class Nodes:
             number, above, is_visible = left.pop()
             table = self._tables[number]
             with table.in_messages():
-                self.worlds[number] = above @ _local(table, pose.get(number, {}))
+                self.worlds[number] = above @ _local(table)
                 is_visible = is_visible and table.extension("KHR_node_visibility").flag("visible", True)
             self._visible[number] = is_visible
             left += [(child, self.worlds[number], is_visible) for child in self._children[number]]
@@ -132,7 +129,7 @@ def _names(tables: list[Table]) -> list[str]:
     return list(used)
 
 
-def _local(table: Table, posed: Mapping[str, npt.NDArray[np.float64]]) -> Matrix:
+def _local(table: Table) -> Matrix:
     """(4, 4) placement of a node below the one above it."""
     if "matrix" in table:
         values = table.numbers("matrix", (0.0,) * 16)
@@ -141,10 +138,7 @@ def _local(table: Table, posed: Mapping[str, npt.NDArray[np.float64]]) -> Matrix
             import_report.changed(f"the matrix of {table.place}: its last row is not [0, 0, 0, 1]")
             matrix[3] = [0, 0, 0, 1]
         return matrix
-    found = {
-        name: posed[name] if name in posed else np.array(table.numbers(name, default))
-        for name, default in _PROPERTIES.items()
-    }
+    found = {name: np.array(table.numbers(name, default)) for name, default in _PROPERTIES.items()}
     return composed(found["translation"], found["rotation"], found["scale"])
 
 

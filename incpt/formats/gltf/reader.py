@@ -17,14 +17,14 @@ from incpt.formats import import_report
 from incpt.formats.clean import tell_of_faces, usable_mesh
 from incpt.formats.gltf import primitives
 from incpt.formats.gltf.accessors import Accessors
-from incpt.formats.gltf.animation import pose_at
+from incpt.formats.gltf.animation import animate
 from incpt.formats.gltf.cameras import camera_of
 from incpt.formats.gltf.compression import DRACO
 from incpt.formats.gltf.document import Document
 from incpt.formats.gltf.lights import light_of
 from incpt.formats.gltf.materials import Materials
 from incpt.formats.gltf.names import Names
-from incpt.formats.gltf.nodes import Node, Nodes, Pose, instances
+from incpt.formats.gltf.nodes import Node, Nodes, instances
 from incpt.formats.gltf.table import Table
 from incpt.formats.gltf.textures import Textures
 from incpt.formats.import_options import current_options
@@ -44,9 +44,10 @@ def read_gltf(path: Path) -> MeshFile:
     document = Document(path)
     document.check_extensions()
     accessors = Accessors(document)
-    nodes = Nodes(document, pose := pose_at(current_options().time, document, accessors))
+    animate(current_options().time, document, accessors)
+    nodes = Nodes(document)
     in_scene = nodes.in_scene()
-    parts = _Parts(document, accessors, nodes, pose).of(in_scene)
+    parts = _Parts(document, accessors, nodes).of(in_scene)
     bounds = _bounds(parts)
     lights = tuple(light for node in in_scene if (light := light_of(node, document)) is not None)
     cameras: dict[str, Camera] = {}
@@ -102,8 +103,8 @@ class _Placed:
 class _Parts:
     """Makes parts of nodes: each geometry is one mesh, however many nodes show it."""
 
-    def __init__(self, document: Document, accessors: Accessors, nodes: Nodes, pose: Pose) -> None:
-        self._document, self._accessors, self._nodes, self._pose = document, accessors, nodes, pose
+    def __init__(self, document: Document, accessors: Accessors, nodes: Nodes) -> None:
+        self._document, self._accessors, self._nodes = document, accessors, nodes
         self._materials = Materials(document, Textures(document, accessors))
         self._counts: dict[str, int] = {}
         self._meshes: dict[object, Mesh | None] = {}
@@ -148,7 +149,7 @@ class _Parts:
         else:
             found = instances(node.table, self._accessors)
             matrices, joints = node.world[None] if found is None else node.world @ found, None
-        weights = self._weights(node, table)
+        weights = _weights(node.table if "weights" in node.table else table)
         is_one = len(shown) * len(matrices) == 1
         for matrix in matrices:
             for place, primitive in enumerate(shown, 1):
@@ -164,13 +165,6 @@ class _Parts:
         for name in primitives.unread_attributes(primitive):
             import_report.left_out(f"{name} of mesh {label!r}: is a set of values more than are read")
         return kind is None
-
-    def _weights(self, node: Node, mesh: Table) -> tuple[float, ...]:
-        posed = self._pose.get(node.number, {}).get("weights")
-        if posed is not None:
-            return tuple(posed.tolist())
-        owner = node.table if "weights" in node.table else mesh
-        return owner.numbers("weights", (0.0,) * len(owner.entries("weights")))
 
     def _joints_of(self, number: int) -> npt.NDArray[np.float64]:
         """(J, 4, 4) what takes points of a mesh at rest to the world by each joint of a skin."""
@@ -223,6 +217,11 @@ class _Parts:
         if mesh is None:
             return None
         return replace(mesh, source=MeshSource(geometry=self._labels.new(placed.label)))
+
+
+def _weights(owner: Table) -> tuple[float, ...]:
+    """Those of morph targets that a node or a mesh has."""
+    return owner.numbers("weights", (0.0,) * len(owner.entries("weights")))
 
 
 def _geometry_key(primitive: Table) -> tuple[object, ...]:

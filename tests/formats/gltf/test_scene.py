@@ -346,10 +346,13 @@ def test_a_file_beside_it_that_changed_is_read_again(tmp_path: Path) -> None:
 # ------------------------------------------------------------------------------------------ animations
 
 
-def animated(path: Path, channels: list[tuple[int, str, str, Any, Any]], **node: Any) -> Path:
-    """A quad below a node; channels are (node, property, interpolation, times, values)."""
+def animated(
+    path: Path, channels: list[tuple[int, str, str, Any, Any]], pointers: list[str] | None = None
+) -> Path:
+    """A quad below a node; channels are (node, property, interpolation, times, values), or lead to what
+    `pointers` say."""
     builder = GltfBuilder()
-    quad = builder.quad(targets=[{"POSITION": builder.accessor(np.float32([[0, 0, 1]] * 4))}])
+    quad = builder.quad(material=0, targets=[{"POSITION": builder.accessor(np.float32([[0, 0, 1]] * 4))}])
     samplers, wanted = [], []
     for number, name, kind, times, values in channels:
         samplers.append({
@@ -357,9 +360,13 @@ def animated(path: Path, channels: list[tuple[int, str, str, Any, Any]], **node:
             "interpolation": kind,
         })  # fmt: skip
         wanted.append({"sampler": len(samplers) - 1, "target": {"node": number, "path": name}})
+    for channel, pointer in zip(wanted, pointers or (), strict=False):
+        channel["target"] = {
+            "path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": pointer}}
+        }  # fmt: skip
     animations = [{"name": "move", "samplers": samplers, "channels": wanted}]
-    nodes = [{"children": [1]}, {"mesh": 0, "weights": [0.0], **node}]
-    return builder.write(path, [quad], nodes=nodes, animations=animations)
+    nodes = [{"children": [1]}, {"mesh": 0, "weights": [0.0]}]
+    return builder.write(path, [quad], nodes=nodes, animations=animations, materials=[{}])
 
 
 @pytest.mark.parametrize(
@@ -390,6 +397,34 @@ def test_animated_rotations_scales_and_weights(tmp_path: Path) -> None:
     # Hermite: (1 + 5) / 2 and an eighth of 2 s times the slope of 3 that leaves the first key.
     assert quad.scale == pytest.approx((3.75, 3.75, 3.75))
     assert quad.mesh.vertices[0, 2] == pytest.approx(4)
+
+
+def test_animated_pointers(tmp_path: Path) -> None:
+    """To what there is, to what has a default only, and into a list; one leads to what cannot be moved."""
+    wanted = [
+        ("/nodes/0/translation", [[0, 0, 0], [2, 0, 0]]),
+        ("/nodes/1/weights/0", [[0], [4]]),
+        ("/materials/0/pbrMetallicRoughness/baseColorFactor", [[1, 0, 0, 1], [0, 1, 0, 1]]),
+        ("/materials/0/extensions/KHR_materials_ior/ior", [[1], [2]]),
+        ("/nodes/1/extensions/KHR_node_visibility/visible", [[0], [0]]),
+        ("/accessors/0/count", [[1], [1]]),
+    ]
+    path = animated(
+        tmp_path / "a.gltf",
+        [(0, "pointer", "LINEAR", [0, 2], values) for _, values in wanted],
+        pointers=[pointer for pointer, _ in wanted],
+    )
+    scene, report = read(path, time=1.0)
+    (quad,) = scene.objects
+    assert quad.position == (1, 0, 0) and quad.mesh.vertices[0, 2] == 2 and not quad.visible
+    material = scene.materials[quad.material]
+    assert material.base_color == (0.5, 0.5, 0) and material.ior == 1.5
+    assert lost(report) == ["part of animation 'move': moves what cannot be moved"]
+    wrong = animated(
+        tmp_path / "b.gltf", [(0, "pointer", "LINEAR", [0], [[1]])], pointers=["/materials/9/alphaCutoff"]
+    )
+    with pytest.raises(InputError, match="pointer '/materials/9/alphaCutoff': leads to nothing"):
+        read(wrong, time=1.0)
 
 
 def test_scenes_at_a_time_are_saved_as_they_are(tmp_path: Path) -> None:
