@@ -117,17 +117,22 @@ def in_file(file: str) -> Iterator[None]:
 
 def read(text: str) -> None:
     """Tells what was read as it is: "2 meshes"."""
-    tell(Remark(Fate.READ, _file.get(), one_line(text)))
+    _tell_of(Fate.READ, text)
 
 
 def left_out(text: str) -> None:
     """Tells what was left out, and why: "3 lines: have no area"."""
-    tell(Remark(Fate.LEFT_OUT, _file.get(), one_line(text)))
+    _tell_of(Fate.LEFT_OUT, text)
 
 
 def changed(text: str) -> None:
     """Tells what is another than in the file, and why."""
-    tell(Remark(Fate.CHANGED, _file.get(), one_line(text)))
+    _tell_of(Fate.CHANGED, text)
+
+
+def _tell_of(fate: Fate, text: str) -> None:
+    # Files may hold halves of characters, which no terminal can be given.
+    tell(Remark(fate, _file.get(), one_line(text).encode("utf-8", "replace").decode()))
 
 
 def tell(*remarks: Remark) -> None:

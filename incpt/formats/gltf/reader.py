@@ -143,7 +143,8 @@ class _Parts:
         table = self._document.item("meshes", number)
         label = table.text("name") or f"mesh {number}"
         shown = [one for one in table.tables("primitives") if self._has_area(one, label)]
-        skin = node.table.index("skin")
+        is_bent = any("JOINTS_0" in primitive.table("attributes") for primitive in shown)
+        skin = node.table.index("skin") if is_bent else None
         if skin is not None:
             matrices, joints = np.eye(4)[None], self._joints_of(skin)
         else:
