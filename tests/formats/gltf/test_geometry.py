@@ -196,6 +196,36 @@ def test_a_quarter_of_a_weight(tmp_path: Path) -> None:
     np.testing.assert_allclose(mesh_of(path).vertices, QUAD + np.float32([0, 0, 63]), atol=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("skin", "message"),
+    [
+        ({"joints": []}, "joints: are none"),
+        ({"joints": [7]}, "not among the nodes"),
+        ({"joints": [1]}, "JOINTS_0: go to 1 of 1"),
+        ({"joints": [1, 1], "inverseBindMatrices": 0}, "type: has 3 components; 16 are needed"),
+        (None, "skins: has 1 entries, none is number 3"),
+    ],
+)
+def test_damaged_skins_are_one_line(tmp_path: Path, skin: dict[str, Any] | None, message: str) -> None:
+    builder = GltfBuilder()
+    quad = builder.quad()
+    quad["attributes"] |= {
+        "JOINTS_0": builder.accessor(np.uint8([[0, 1, 0, 0]] * 4)),
+        "WEIGHTS_0": builder.accessor(np.float32([[1, 0, 0, 0]] * 4)),
+    }
+    nodes = [{"mesh": 0, "skin": 3 if skin is None else 0}, {}]
+    path = builder.write(tmp_path / "a.gltf", [quad], nodes=nodes, skins=[skin or {"joints": [1]}])
+    with pytest.raises(InputError, match=rf"^{path}: [^\n]*{message}[^\n]*$"):
+        mesh_of(path)
+
+
+def test_a_skin_without_joints_leaves_its_mesh_at_its_node(tmp_path: Path) -> None:
+    builder = GltfBuilder()
+    nodes = [{"mesh": 0, "skin": 0, "translation": [5, 0, 0]}, {}]
+    path = builder.write(tmp_path / "a.gltf", [builder.quad()], nodes=nodes, skins=[{"joints": [1]}])
+    np.testing.assert_allclose(mesh_of(path).vertices, QUAD + np.float32([5, 0, 0]))
+
+
 def test_draco(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     draco = pytest.importorskip("DracoPy")
     ball = trimesh.creation.icosphere(subdivisions=2)

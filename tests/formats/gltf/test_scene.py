@@ -131,7 +131,6 @@ def test_a_mirrored_part_is_turned_over(tmp_path: Path) -> None:
         ([{"mesh": 0, "rotation": [0, 0, 1]}], "rotation: has 3 numbers; 4 are needed"),
         ([{"mesh": 0, "translation": [0, 0, "z"]}], "translation: 'z' is not a number"),
         ([{"mesh": 0, "matrix": [float("nan")] * 16}], "matrix: nan is not a finite number"),
-        ([{"mesh": 0, "skin": 0}], "skins: has 0 entries"),
     ],
 )
 def test_damaged_nodes_are_one_line(tmp_path: Path, nodes: list[dict[str, Any]], message: str) -> None:
