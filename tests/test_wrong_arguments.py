@@ -46,6 +46,7 @@ WRONG: Mapping[str, Any] = {
     "a stranger": Stranger(),
 }
 
+CORNELL = Path(__file__).parents[1] / "scenes" / "cornell.toml"
 SCENE = mixed_scene(size=(16, 8))
 RIGHT: Mapping[str, Mapping[str, Any]] = {
     "Mesh": {"vertices": np.eye(3), "faces": [[0, 1, 2]]},
@@ -80,7 +81,7 @@ RIGHT: Mapping[str, Mapping[str, Any]] = {
     "Transform.from_matrix": {"matrix": np.eye(4)},
     "Transform.moved_to": {"matrix": np.eye(4)},
     "diff": {"old": SCENE, "new": SCENE},
-    "load": {"path": Path(__file__).parents[1] / "scenes" / "cornell.toml"},
+    "load": {"path": CORNELL},
     "load_image": {"path": "a.exr"},
     "load_mesh": {"path": "a.obj"},
     "save": {"scene": SCENE, "path": "a.toml"},

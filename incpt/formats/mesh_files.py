@@ -78,6 +78,7 @@ def load_file(path: str | os.PathLike[str]) -> MeshFile:
     with import_report.gathered() as told:
         found = cast(MeshFile, row.read(path))
     import_report.tell(*told.report.remarks)
+    _forget_other_times(_key(path))
     _files[_key(path)] = _Known(
         replace(found, parts=tuple(replace(part, mesh=_NO_MESH) for part in found.parts)),
         tuple(_stamp(file) for file in found.files),
@@ -85,6 +86,14 @@ def load_file(path: str | os.PathLike[str]) -> MeshFile:
         tuple(weakref.ref(part.mesh) for part in found.parts),
     )
     return found
+
+
+def _forget_other_times(key: FileKey) -> None:
+    """Frees what is known of a file at other times, of which a sequence of pictures has thousands."""
+    stamp, options = key
+    for other in [known for known in _files if known[0] == stamp]:
+        if other[1].time not in (None, options.time):
+            del _files[other]
 
 
 def _known(path: Path) -> _Known | None:

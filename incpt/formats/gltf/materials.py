@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import weakref
 from collections.abc import Collection
 from dataclasses import replace
 from typing import Any
@@ -204,8 +205,22 @@ def _normal_scale(owner: Table, key: str) -> float:
     return owner.table(key).number("scale", 1.0, -LARGEST_SLOPE, LARGEST_SLOPE)
 
 
+_rough: weakref.WeakKeyDictionary[Bitmap, dict[float, weakref.ref[Bitmap]]] = weakref.WeakKeyDictionary()
+"""What was made of bitmaps, by the glossiness, as long as it is in use."""
+
+
 def _roughness_of(bitmap: Bitmap, glossiness: float) -> Bitmap:
-    """The green channel of a metallic-roughness image from the alpha of a specular-glossiness image."""
+    """The green channel of a metallic-roughness image from the alpha of a specular-glossiness image; the same
+    bitmap as long as that is in use."""
+    known = _rough.setdefault(bitmap, {})
+    made = known[glossiness]() if glossiness in known else None
+    if made is None:
+        made = _with_roughness(bitmap, glossiness)
+        known[glossiness] = weakref.ref(made)
+    return made
+
+
+def _with_roughness(bitmap: Bitmap, glossiness: float) -> Bitmap:
     pixels = bitmap.pixels
     largest = 1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max)
     gloss = glossiness * (pixels[:, :, -1] / largest if bitmap.has_alpha else np.ones(pixels.shape[:2]))

@@ -85,6 +85,10 @@ def test_specular_and_glossiness_from_an_image(tmp_path: Path) -> None:
     assert made.roughness == 1 and pixel_of(made.specular_color_texture) == [10, 20, 30, 51]
     # Half of a glossiness of 0.2.
     assert pixel_of(made.metallic_roughness_texture) == [0, round(0.9 * 255), 0]
+    # At another time it is the same image, of which a sequence would have thousands.
+    scene, _ = registry.load_with_report(tmp_path / "a.gltf", time=1.0)
+    (again,) = scene.materials.values()
+    assert again == made
 
 
 def test_numbers_out_of_range_are_told(tmp_path: Path) -> None:

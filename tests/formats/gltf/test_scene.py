@@ -434,6 +434,13 @@ def test_scenes_at_a_time_are_saved_as_they_are(tmp_path: Path) -> None:
     assert again.objects[0].mesh.vertices[0, 2] == 4
 
 
+def test_only_the_last_time_of_a_file_is_kept(tmp_path: Path) -> None:
+    path = animated(tmp_path / "a.gltf", [(1, "weights", "LINEAR", [0, 2], [[0], [8]])])
+    at_rest, early, late = (read(path, time=time)[0] for time in (None, 0.5, 1.0))
+    assert read(path)[0] == at_rest and read(path, time=1.0)[0] == late
+    assert read(path, time=0.5)[0] != early, "it is read again"
+
+
 @pytest.mark.parametrize(
     ("channel", "message"),
     [
