@@ -22,8 +22,10 @@ COMPONENTS: dict[int, np.dtype[Any]] = {
     5126: np.dtype("<f4"),
 }
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-MAX_UNSTORED = 100_000_000
-"""The most values that an accessor without data may claim, which are zeros in memory all the same."""
+_UNSTORED_PER_BYTE = 64
+"""How many values accessors without data, which are zeros in memory all the same, may claim for each byte of
+the file and those beside it: they say what morph targets leave as it is, and the mesh itself is stored."""
+_ALWAYS_UNSTORED = 1 << 16
 _LARGEST_COUNT = 1 << 60
 
 Array = npt.NDArray[Any]
@@ -79,7 +81,7 @@ class Accessors:
             count = table.whole("count", 1, _LARGEST_COUNT)
             if "bufferView" in table:
                 values = self._stored(table, count, dtype, width)
-            elif count * width > MAX_UNSTORED:
+            elif count * width > _UNSTORED_PER_BYTE * self.document.size() + _ALWAYS_UNSTORED:
                 raise InputError(f"claims {count} values without storing them; the file is damaged")
             else:
                 values = np.zeros((count, width), dtype)

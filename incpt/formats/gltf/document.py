@@ -13,7 +13,7 @@ from typing import Any
 
 from incpt.core.checks import described
 from incpt.core.errors import InputError, one_line, reason_of
-from incpt.core.files import read_bytes
+from incpt.core.files import check_readable, read_bytes
 from incpt.formats import import_report
 from incpt.formats.gltf.table import Table
 from incpt.formats.import_options import current_options
@@ -61,6 +61,15 @@ class Document:
         self.root = Table(self._json, "")
         _check_version(self.root.table("asset"))
         self._buffers: dict[int, memoryview] = {}
+        self._size: int | None = None
+
+    def size(self) -> int:
+        """Bytes of the file and of the buffers beside it. Raises InputError."""
+        if self._size is None:
+            uris = [table.text("uri", "data:") for table in self.root.tables("buffers")]
+            beside = [self.file(uri) for uri in uris if not uri.startswith("data:")]
+            self._size = sum(check_readable(file).st_size for file in (self.path, *beside))
+        return self._size
 
     @property
     def has_binary(self) -> bool:

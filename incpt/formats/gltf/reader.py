@@ -6,6 +6,7 @@ import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,8 @@ from incpt.scene.mesh_part import MeshFile, MeshPart
 from incpt.scene.model import CAMERA_NAME
 from incpt.scene.transform import IDENTITY, Transform
 
+MOST_PARTS = 1_000_000
+"""Meshes at places that a file may show: a small file can name a great many, each of many parts."""
 _SAME = 1e-9
 """Matrices that differ by less of their largest number are the same placement."""
 
@@ -114,7 +117,10 @@ class _Parts:
 
     def of(self, nodes: Sequence[Node]) -> tuple[MeshPart, ...]:
         """The parts that nodes show. Raises InputError where no face is left."""
-        placed = [one for node in nodes if "mesh" in node.table for one in self._placed(node)]
+        shown = (one for node in nodes if "mesh" in node.table for one in self._placed(node))
+        placed = list(islice(shown, MOST_PARTS + 1))
+        if len(placed) > MOST_PARTS:
+            raise InputError(f"shows more than {MOST_PARTS:,} meshes; split it")
         if not placed and self._without_area:
             raise InputError(f"has no usable face (no {' or '.join(self._without_area)} have area)")
         parts = [part for one in placed if (part := self._part(one)) is not None]

@@ -168,6 +168,16 @@ def test_instances(tmp_path: Path) -> None:
     assert max(o.world_bounds[1, 0] for o in scene.objects) == pytest.approx(7)
 
 
+def test_too_many_parts_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("incpt.formats.gltf.reader.MOST_PARTS", 2)
+    path = write(tmp_path / "a.gltf", [{"mesh": 0}] * 3, scenes=[{"nodes": [0, 1, 2]}])
+    with pytest.raises(InputError, match="shows more than 2 meshes; split it"):
+        read(path)
+    assert (
+        len(read(write(tmp_path / "b.gltf", [{"mesh": 0}] * 2, scenes=[{"nodes": [0, 1]}]))[0].objects) == 2
+    )
+
+
 def test_meshes_of_a_file_are_added_where_they_stand(tmp_path: Path) -> None:
     path = write(tmp_path / "a.gltf", NODES, scenes=[{"nodes": [0, 2]}], cameras=[CAMERA])
     scene, names = insert.add_mesh(Scene(), path, at=(10.0, 0.0, 0.0))
