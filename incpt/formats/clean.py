@@ -26,13 +26,16 @@ def usable_mesh(
     normals: npt.NDArray[np.floating[Any]] | None,
     counts: dict[str, int],
     attributes: VertexAttributes = NO_ATTRIBUTES,
+    normal_at: npt.NDArray[np.int64] | None = None,
+    uv_at: npt.NDArray[np.int64] | None = None,
 ) -> Mesh | None:
     """A mesh of the faces that can be rendered, or None if there is none.
 
     `vertices` (V, 3), `faces` (F, 3) and `normals` (V, 3) at the vertices, of any length, or None for flat
     faces, and `attributes` may hold whatever a damaged file does. `counts` gets, by the words of a message,
-    how many faces were left out, and under "in all" how many there were. Raises InputError: arrays of other
-    shapes.
+    how many faces were left out, and under "in all" how many there were. `normal_at` and `uv_at` (F, 3) are
+    the places of corners in normals and texture coordinates where they are others than those of their
+    vertices. Raises InputError: arrays of other shapes.
     """
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
         raise InputError("has vertices without three coordinates; the file is damaged")
@@ -44,9 +47,15 @@ def usable_mesh(
     finite = np.all(np.abs(stored) <= LARGEST, axis=1)
     # No face uses these vertices any more, but a mesh holds finite ones only.
     stored = np.where(finite[:, None], stored, np.float32(0))
-    faces = faces if usable.all() else faces[usable]
-    corner_normals = None if normals is None else handed_over(_corner_normals(stored, faces, normals))
-    at_corners = attributes.at_corners(faces)
+    if not usable.all():
+        faces = faces[usable]
+        normal_at = None if normal_at is None else normal_at[usable]
+        uv_at = None if uv_at is None else uv_at[usable]
+    corner_normals = None
+    if normals is not None:
+        places = faces if normal_at is None else normal_at
+        corner_normals = handed_over(_corner_normals(stored, faces, normals, places))
+    at_corners = attributes.at_corners(faces, uv_at)
     return Mesh(handed_over(stored), handed_over(faces.astype(np.int32)), corner_normals, **at_corners)
 
 
@@ -157,17 +166,21 @@ def _again(corners: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
 
 
 def _corner_normals(
-    vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int64], normals: npt.NDArray[np.floating[Any]]
+    vertices: npt.NDArray[np.float32],
+    faces: npt.NDArray[np.int64],
+    normals: npt.NDArray[np.floating[Any]],
+    places: npt.NDArray[np.int64],
 ) -> npt.NDArray[np.float32]:
-    """(F, 3, 3) unit normals of (V, 3) normals at the vertices; a face's own where one has no direction."""
+    """(F, 3, 3) unit normals of (N, 3) normals at the places (F, 3) of corners; a face's own where one has no
+    direction."""
     with np.errstate(all="ignore"):
         lengths = np.linalg.norm(normals.astype(np.float64), axis=1, keepdims=True)
         unit = (normals / lengths).astype(np.float32)
     is_direction = np.isfinite(unit).all(axis=1) & (lengths[:, 0] > 1e-12)
-    corners = np.take(unit, faces, axis=0)
+    corners = np.take(unit, places, axis=0)
     if is_direction.all():
         return corners
-    usable = is_direction[faces]
+    usable = is_direction[places]
     if not usable.all():
         a, b, c = (vertices[faces[:, corner]].astype(np.float64) for corner in range(3))
         flat = np.cross(b - a, c - a)

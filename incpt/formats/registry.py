@@ -69,7 +69,7 @@ FORMATS = (
     OPENEXR,
     Format(".glb", FileKind.MESH, _GLTF),
     Format(".gltf", FileKind.MESH, _GLTF),
-    Format(".obj", FileKind.MESH, _TRIMESH),
+    Format(".obj", FileKind.MESH, ("obj.reader", "read_obj")),
     Format(".off", FileKind.MESH, _TRIMESH),
     Format(".ply", FileKind.MESH, _TRIMESH),
     Format(".stl", FileKind.MESH, _TRIMESH),

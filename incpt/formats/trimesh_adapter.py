@@ -7,7 +7,6 @@ InputError; what had to be left out is told in the report.
 
 from __future__ import annotations
 
-import io
 import logging
 import os
 import warnings
@@ -23,24 +22,22 @@ import numpy.typing as npt
 import trimesh
 
 from incpt.core.errors import InputError, reason_of
-from incpt.core.files import read_bytes
 from incpt.formats.clean import tell_of_faces, usable_mesh
-from incpt.formats.obj import ODD_FACE, absolute_obj, utf8
 from incpt.formats.placement import placed_arrays
 from incpt.formats.vertex_attributes import VertexAttributes
 from incpt.picture.color import linear_from_srgb
 from incpt.scene.mesh import MeshSource
 from incpt.scene.mesh_part import MeshFile, MeshPart
 
-_UV_UPWARDS = ("obj", "ply", "dae")
+_UV_UPWARDS = ("ply", "dae")
 """Files whose texture coordinates are (0, 0) at the bottom left of an image."""
 
 
 def read_with_trimesh(path: Path) -> MeshFile:
     """A mesh file that trimesh can read; see `mesh_files.load_file`. Raises InputError."""
     suffix = path.suffix[1:].lower()
-    loaded, dropped = _load_obj(path) if suffix == "obj" else (_load(path, suffix), 0)
-    counts = {"in all": dropped, "with an index out of range": dropped}
+    loaded = _load(path, suffix)
+    counts: dict[str, int] = {}
     instances = _instances(loaded)
     parts = []
     for name, geometry_name, matrix in instances:
@@ -110,39 +107,15 @@ def _quiet() -> Iterator[None]:
         log.removeHandler(handler)
 
 
-def _load(path: Path, suffix: str, content: bytes | None = None) -> trimesh.Scene:
-    options: dict[str, Any] = {"process": False}
-    if suffix in ("obj", "ply"):
-        # Textures are not used, so that no file but this one is opened.
-        options["skip_materials"] = True
-    if suffix == "obj":
-        options |= {"split_objects": True, "group_material": False}
+def _load(path: Path, suffix: str) -> trimesh.Scene:
+    # Textures are not used, so that no file but this one is opened.
+    options: dict[str, Any] = {"skip_materials": True} if suffix == "ply" else {}
     try:
         with _quiet():
-            stream: Any = str(path) if content is None else io.BytesIO(content)
-            loaded = trimesh.load_scene(stream, file_type=suffix, **options)
+            loaded = trimesh.load_scene(str(path), file_type=suffix, process=False, **options)
     except Exception as error:  # trimesh raises errors of any type for a damaged file.
         raise InputError(f"is no {suffix.upper()} mesh, or a damaged one ({reason_of(error)})") from None
     return loaded
-
-
-def _load_obj(path: Path) -> tuple[trimesh.Scene, int]:
-    """An OBJ file, and how many faces were left out for a vertex index that is out of range.
-
-    trimesh counts relative indices from the end of the file and fails altogether on one out of range:
-    such files are rewritten for it.
-    """
-    content = utf8(read_bytes(path))
-    if not ODD_FACE.search(content):
-        try:
-            return _load(path, "obj", content), 0
-        except InputError:
-            pass
-    try:
-        content, left_out = absolute_obj(content)
-    except ValueError as error:
-        raise InputError(f"is no OBJ mesh, or a damaged one ({reason_of(error)})") from None
-    return _load(path, "obj", content), left_out
 
 
 def _instances(loaded: trimesh.Scene) -> list[tuple[str, str, npt.NDArray[np.float64]]]:

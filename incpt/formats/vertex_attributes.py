@@ -32,13 +32,17 @@ class VertexAttributes:
             side = self.tangents[:, 3:] * np.sign(np.linalg.det(linear))
         return replace(self, tangents=np.concatenate([along, side], axis=1))
 
-    def at_corners(self, faces: npt.NDArray[np.int64]) -> dict[str, Any]:
-        """The keywords of a Mesh for faces (F, 3). Numbers that are not finite become 0."""
+    def at_corners(
+        self, faces: npt.NDArray[np.int64], uv_at: npt.NDArray[np.int64] | None = None
+    ) -> dict[str, Any]:
+        """The keywords of a Mesh for faces (F, 3). `uv_at` (F, 3): where their texture coordinates stand, if
+        not at the vertices. Numbers that are not finite become 0."""
+        places = faces if uv_at is None else uv_at
 
-        def at(values: Array) -> Array:
-            return handed_over(np.take(values.astype(np.float32, copy=False), faces, axis=0))
+        def at(values: Array, where: npt.NDArray[np.int64] = faces) -> Array:
+            return handed_over(np.take(values.astype(np.float32, copy=False), where, axis=0))
 
-        keywords: dict[str, Any] = {"uvs": tuple(at(_within(uv, LARGEST)) for uv in self.uvs)}
+        keywords: dict[str, Any] = {"uvs": tuple(at(_within(uv, LARGEST), places) for uv in self.uvs)}
         if self.colors is not None:
             keywords["colors"] = at(np.clip(_within(self.colors, LARGEST), 0, 1))
         if self.tangents is not None:

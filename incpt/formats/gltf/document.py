@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import binascii
 import json
-import os
 import re
 import urllib.parse
 from pathlib import Path, PurePosixPath, PureWindowsPath
@@ -16,7 +15,7 @@ from incpt.core.errors import InputError, one_line, reason_of
 from incpt.core.files import check_readable, read_bytes
 from incpt.formats import import_report
 from incpt.formats.gltf.table import Table
-from incpt.formats.import_options import current_options
+from incpt.formats.outside import check_inside
 
 MATERIAL_EXTENSIONS = tuple(
     f"KHR_materials_{name}"
@@ -132,13 +131,7 @@ class Document:
         """The file that a URI names, which stays in the folder of this one unless the options let it. Raises
         InputError."""
         path = _local_path(uri)
-        folder = os.path.realpath(self.path.parent)
-        file = os.path.realpath(os.path.join(folder, path))
-        if not current_options().allow_outside and not Path(file).is_relative_to(folder):
-            raise InputError(
-                f"{described(uri)} leads out of the folder of the file; --allow-outside lets it, or "
-                "allow_outside=True in Python"
-            )
+        check_inside(self.path.parent, path)
         found = self.path.parent / path
         self.files.append(found)
         return found

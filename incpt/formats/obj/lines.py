@@ -1,0 +1,291 @@
+"""The text of an OBJ file: vertices, and runs of faces that have their state in common.
+
+Files have millions of lines, of which neighbours are alike. So numpy finds the lines and their keywords, and
+reads the numbers of neighbours at once; where anything is odd, lines are read one by one.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from incpt.core.errors import InputError
+
+Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int64]
+Corners = npt.NDArray[np.int32]
+
+NOWHERE, IMPOSSIBLE = -1, -2
+"""Indices in place of one that a corner does not have, and of a position that is not there."""
+_NEWLINE, _TAB, _SPACE = b"\n\t "
+_FREQUENT = (b"v", b"vt", b"vn", b"f")
+_MOST_LINES = 1 << 16
+"""Lines that are read at once, so that few are read again where one is odd."""
+_WIDTHS = {b"v": 3, b"vt": 2, b"vn": 3}
+"""Numbers that are used of a line; those of `vt` may be one, and of `v` six or seven, with a colour."""
+_WITH_COLORS = (6, 7)
+_STATES = {b"o": "object", b"g": "group", b"usemtl": "material"}
+_WAYS: Mapping[tuple[float, float], list[int]] = {
+    (0, 0): [0], (1, 0): [0, 1], (2, 1): [0, 2], (2, 0): [0, 1, 2],
+}  # fmt: skip
+"""Which indices a run of corners has, by the slashes and the double ones of each. All corners of a run are
+written in one of these ways as a rule, and then numpy reads them at once."""
+_CURVES = frozenset(b"vp cstype deg bmat step curv curv2 surf parm trim hole scrv sp end con".split())
+"""Keywords of free-form curves and surfaces."""
+_UNUSED = frozenset(
+    b"mg bevel c_interp d_interp lod shadow_obj trace_obj ctech stech maplib usemap call csh".split()
+)
+"""Keywords of what makes no difference here, or comes from another file."""
+
+
+@dataclass(frozen=True)
+class State:
+    """What faces belong to: an object `o`, groups `g`, a material `usemtl`, a smoothing group `s` or 0."""
+
+    object: str = ""
+    group: str = ""
+    material: str = ""
+    smoothing: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class FaceRun:
+    """Polygons that follow each other under one state: how many corners each has (P,), and the indices of
+    position, texture coordinates and normal at each corner (C, 3), counted from 0; NOWHERE, or of positions
+    IMPOSSIBLE, where there is none."""
+
+    state: State
+    sizes: Indices
+    corners: Corners
+
+
+@dataclass
+class ObjText:
+    """What the lines of a file say."""
+
+    vertices: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    colors: Array | None = None
+    uvs: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    normals: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    runs: list[FaceRun] = field(default_factory=list)
+    libraries: list[str] = field(default_factory=list)
+    lines: int = 0
+    points: int = 0
+    curves: int = 0
+    unknown: dict[str, int] = field(default_factory=dict)
+
+
+def decoded(content: bytes) -> bytes:
+    """The same text as UTF-8 without a byte order mark: files are UTF-16 too, and Latin-1 where they are of
+    older programs."""
+    for mark, encoding in ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16")):
+        if content.startswith(mark):
+            try:
+                return content.decode(encoding).encode()
+            except UnicodeDecodeError:
+                raise InputError(
+                    "has a byte order mark, and no text behind it; the file is damaged"
+                ) from None
+    try:
+        content.decode()
+    except UnicodeDecodeError:
+        return content.decode("latin-1").encode()
+    return content
+
+
+def plain_text(content: bytes) -> bytes:
+    """The text without comments, with lines that end alike, and with those that go on in the next one put
+    together."""
+    if b"\r" in content:
+        content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if b"\\\n" in content:
+        content = content.replace(b"\\\n", b" ")
+    if b"#" in content:
+        content = re.sub(rb"#[^\n]*", b"", content)
+    return content if content.endswith(b"\n") else content + b"\n"
+
+
+def read_text(content: bytes) -> ObjText:
+    """What the lines say. Raises InputError for a line that is none of OBJ's."""
+    content = plain_text(content)
+    found, state = ObjText(), State()
+    rows: dict[bytes, list[Array]] = {name: [] for name in (*_WIDTHS, b"color")}
+    totals = dict.fromkeys(_WIDTHS, 0)
+    for key, piece, lines in _pieces(content):
+        if key in _WIDTHS:
+            numbers = _numbers(piece, lines)
+            if key == b"v":
+                rows[b"color"].append(_colors_of(numbers))
+            rows[key].append(_fitted(numbers, _WIDTHS[key]))
+            totals[key] += lines
+        elif key in (b"f", b"fo"):
+            found.runs.append(FaceRun(state, *_faces(piece, lines, np.array(list(totals.values())))))
+        else:
+            state = _said(found, state, key, piece.strip().decode("utf-8", "replace"))
+    found.vertices, found.uvs, found.normals = (
+        np.concatenate([np.zeros((0, _WIDTHS[name])), *rows[name]]) for name in _WIDTHS
+    )
+    colors = np.concatenate([np.zeros((0, 3)), *rows[b"color"]])
+    found.colors = None if np.isnan(colors).all() else np.nan_to_num(colors, nan=1.0)
+    return found
+
+
+def _pieces(content: bytes) -> Iterator[tuple[bytes, bytes, int]]:
+    """Keyword, text and number of lines: of neighbours with the same of v, vt, vn and f together, without
+    the keyword; of other lines that say anything one by one."""
+    buffer = np.frombuffer(content, np.uint8)
+    ends = np.flatnonzero(buffer == _NEWLINE)
+    starts = np.concatenate([[0], ends[:-1] + 1])
+    kinds = _kinds(buffer, starts, ends)
+    changes = np.flatnonzero(np.diff(kinds)) + 1
+    bounds = np.unique(np.concatenate([[0], changes, np.arange(0, len(kinds), _MOST_LINES), [len(kinds)]]))
+    for first, last in pairwise(bounds.tolist()):
+        text = content[starts[first] : ends[last - 1]]
+        if kinds[first] < len(_FREQUENT):
+            key = _FREQUENT[kinds[first]]
+            yield key, text.replace(key, b" "), last - first
+            continue
+        for line in text.split(b"\n"):
+            words = line.split(None, 1)
+            if words:
+                yield words[0], words[1] if len(words) > 1 else b"", 1
+
+
+def _kinds(buffer: npt.NDArray[np.uint8], starts: Indices, ends: Indices) -> npt.NDArray[np.uint8]:
+    """(lines,) the place of each line's keyword in _FREQUENT, or one behind the last."""
+    kinds = np.full(len(starts), len(_FREQUENT), np.uint8)
+    for number, key in enumerate(_FREQUENT):
+        fits = ends - starts > len(key)
+        for place, byte in enumerate(key):
+            fits &= buffer[np.minimum(starts + place, ends)] == byte
+        behind = buffer[np.minimum(starts + len(key), ends)]
+        kinds[fits & ((behind == _SPACE) | (behind == _TAB))] = number
+    return kinds
+
+
+def _words_in_lines(piece: bytes, lines: int) -> Indices:
+    """(lines,) how many words each line has."""
+    buffer = np.frombuffer(piece + b"\n", np.uint8)
+    is_word = buffer > _SPACE
+    begins = is_word.copy()
+    begins[1:] &= ~is_word[:-1]
+    before = np.searchsorted(np.flatnonzero(begins), np.flatnonzero(buffer == _NEWLINE))
+    assert len(before) == lines, "a piece has as many lines as it is said to have"
+    return np.diff(before, prepend=0)
+
+
+def _numbers(piece: bytes, lines: int) -> Array:
+    """(lines, n) the numbers of each line, NaN where it has fewer, or what is none."""
+    words = _words_in_lines(piece, lines)
+    width = int(words.max(initial=0))
+    if width == 0 or (words == width).all():
+        numbers = _read(piece, np.float64)
+        if len(numbers) == width * lines:
+            return numbers.reshape(lines, width)
+    result = np.full((lines, width), np.nan)
+    for row, line in zip(result, piece.split(b"\n"), strict=True):
+        fields = line.split()
+        row[: len(fields)] = [_number(word) for word in fields]
+    return result
+
+
+def _read(text: bytes, dtype: type) -> npt.NDArray[Any]:
+    """The numbers of a text; fewer, where one is none."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        try:
+            return np.fromstring(text, dtype, sep=" ")
+        except ValueError:  # from numpy 2.3 on
+            return np.zeros(0, dtype)
+
+
+def _said(found: ObjText, state: State, key: bytes, rest: str) -> State:
+    """The state behind a line that is no vertex and no face."""
+    if key in _STATES:
+        changed: dict[str, Any] = {_STATES[key]: rest}
+        return replace(state, **changed)
+    if key == b"s":
+        number = rest.lower()
+        smoothing = 0 if number in ("off", "0", "") else int(number) if number.isdigit() else 1
+        return replace(state, smoothing=smoothing)
+    if key == b"mtllib":
+        found.libraries.append(rest)
+    elif key in (b"l", b"p"):
+        found.lines += key == b"l"
+        found.points += key == b"p"
+    elif key in _CURVES:
+        found.curves += 1
+    elif key not in _UNUSED:
+        if not re.fullmatch(rb"[A-Za-z_][\w.-]{0,30}", key):
+            raise InputError(f"is no OBJ mesh, or a damaged one ({key[:20]!r} is no keyword)")
+        name = key.decode()
+        found.unknown[name] = found.unknown.get(name, 0) + 1
+    return state
+
+
+def _number(word: bytes) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        return float("nan")
+
+
+def _fitted(numbers: Array, width: int) -> Array:
+    """(lines, width): more numbers are left away, and of texture coordinates a missing one is 0."""
+    if numbers.shape[1] < width:
+        filler = 0.0 if width == 2 else np.nan
+        missing = np.full((len(numbers), width - numbers.shape[1]), filler)
+        numbers = np.concatenate([numbers, missing], axis=1)
+    return numbers[:, :width]
+
+
+def _colors_of(numbers: Array) -> Array:
+    """(lines, 3) what stands behind the position, NaN where there is none."""
+    colors = np.full((len(numbers), 3), np.nan)
+    if numbers.shape[1] in _WITH_COLORS:
+        colors[:] = numbers[:, 3:6]
+    return colors
+
+
+def _faces(piece: bytes, lines: int, totals: Indices) -> tuple[Indices, Corners]:
+    """Sizes and corners of faces, see FaceRun, where there are `totals` of each kind of vertex so far."""
+    sizes = _words_in_lines(piece, lines)
+    written = _corners(piece, int(sizes.sum()))
+    corners = np.where(written > 0, written - 1, written + totals)
+    corners[(written == 0) | (corners < 0) | (corners >= totals)] = NOWHERE
+    # What is not there beside the position is no mistake.
+    corners[:, 0][corners[:, 0] == NOWHERE] = IMPOSSIBLE
+    return sizes, corners.astype(np.int32)
+
+
+def _corners(piece: bytes, count: int) -> Indices:
+    """(count, 3) the numbers of `v`, `v/vt`, `v//vn` and `v/vt/vn`; 0 where there is none."""
+    result = np.zeros((count, 3), np.int64)
+    if count == 0:
+        return result
+    columns = _WAYS.get((piece.count(b"/") / count, piece.count(b"//") / count))
+    if columns is not None:
+        numbers = _read(piece.replace(b"/", b" "), np.int64)
+        if len(numbers) == len(columns) * count:
+            result[:, columns] = numbers.reshape(count, -1)
+            return result
+    for row, word in zip(result, piece.split(), strict=True):
+        for place, text in enumerate(word.split(b"/")[:3]):
+            row[place] = _index(text)
+    return result
+
+
+def _index(word: bytes) -> int:
+    try:
+        index = int(word or 0)
+    except ValueError:
+        shown = word[:20].decode("utf-8", "replace")
+        raise InputError(f"is no OBJ mesh, or a damaged one ({shown!r} is no index)") from None
+    return index if abs(index) < 1 << 62 else 0

@@ -1,0 +1,198 @@
+"""Reads an OBJ file: an object for each object or group of it and each material."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from incpt.core.errors import InputError
+from incpt.core.files import read_bytes
+from incpt.formats import import_report
+from incpt.formats.clean import tell_of_faces, usable_mesh
+from incpt.formats.obj.lines import IMPOSSIBLE, NOWHERE, ObjText, State, decoded, read_text
+from incpt.formats.obj.mtl import MaterialLibrary
+from incpt.formats.outside import check_inside
+from incpt.formats.polygons import triangulated
+from incpt.formats.vertex_attributes import VertexAttributes
+from incpt.picture.color import linear_from_srgb
+from incpt.scene.mesh import Mesh, MeshSource
+from incpt.scene.mesh_part import MeshFile, MeshPart
+
+Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int64]
+
+
+def read_obj(path: Path) -> MeshFile:
+    """The parts of an OBJ file with the materials of its MTL files; see `mesh_files.load_file`. Raises
+    InputError."""
+    text = read_text(decoded(read_bytes(path)))
+    triangles = _Triangles(text)
+    normals = _smoothed(text, triangles)
+    counts = {"in all": triangles.too_small, "with fewer than three corners": triangles.too_small}
+    keys = list(dict.fromkeys(_part_of(run.state) for run in text.runs))
+    place = {key: number for number, key in enumerate(keys)}
+    part_of_run = np.array([place[_part_of(run.state)] for run in text.runs], np.int64)
+    part_of = part_of_run[triangles.run]
+    meshes = [_mesh(text, triangles, normals, np.flatnonzero(part_of == i), counts) for i in range(len(keys))]
+    tell_of_faces(counts)
+    library = _materials(path, text)
+    _tell_of_rest(text)
+    found = [(name, key[1], mesh) for name, key, mesh in zip(_names(keys), keys, meshes, strict=True) if mesh]
+    source = MeshSource(file=os.path.abspath(path))
+    return MeshFile(
+        tuple(
+            MeshPart(
+                name if len(found) > 1 else None,
+                replace(mesh, source=replace(source, part=name) if len(found) > 1 else source),
+                material or None,
+                library.materials.get(material),
+            )
+            for name, material, mesh in found
+        ),
+        files=tuple(library.files),
+    )
+
+
+def _part_of(state: State) -> tuple[str, str]:
+    """By what faces are parted: the name of an object, or of groups where there is none, and the material."""
+    return state.object or state.group, state.material
+
+
+def _names(keys: Sequence[tuple[str, str]]) -> list[str]:
+    """Names of parts, no two alike: with the material where an object has several."""
+    several = {name for name, _ in keys if sum(other == name for other, _ in keys) > 1}
+    used: set[str] = set()
+    names = []
+    for name, material in keys:
+        whole = f"{name}/{material}" if name in several and material and name else name or material or "part"
+        unique, number = whole, 1
+        while unique in used:
+            number += 1
+            unique = f"{whole}.{number}"
+        used.add(unique)
+        names.append(unique)
+    return names
+
+
+class _Triangles:
+    """All faces of a file as triangles. `run` (T,): the number of the run that each comes from; `positions`,
+    `uvs`, `normals` (T, 3): the places of its corners in the text's arrays, NOWHERE where it has none."""
+
+    def __init__(self, text: ObjText) -> None:
+        sizes = np.concatenate([np.zeros(0, np.int64), *(run.sizes for run in text.runs)])
+        corners = np.concatenate([np.zeros((0, 3), np.int32), *(run.corners for run in text.runs)])
+        # Impossible positions count from the end, where there is none.
+        there = np.concatenate([text.vertices, np.full((2, 3), np.nan)])
+        numbers = triangulated(sizes, there, corners[:, 0])
+        polygon = np.repeat(np.arange(len(sizes)), np.maximum(sizes - 2, 0))
+        # A polygon with an impossible corner goes as a whole.
+        owner = np.repeat(np.arange(len(sizes)), sizes)
+        is_bad = np.zeros(len(sizes), bool)
+        is_bad[owner[corners[:, 0] < 0]] = True
+        self.positions = corners[numbers, 0]
+        self.positions[is_bad[polygon]] = IMPOSSIBLE
+        self.uvs, self.normals = corners[numbers, 1], corners[numbers, 2]
+        run_of = np.repeat(np.arange(len(text.runs)), [len(run.sizes) for run in text.runs])
+        self.run = run_of[polygon]
+        self.too_small = int((sizes < 3).sum())
+
+
+def _smoothed(text: ObjText, triangles: _Triangles) -> Array:
+    """(N, 3) the normals of the file, and behind them those of smoothing groups, which triangles get that
+    have none of their own: at each vertex of a group the mean over its faces there, weighted by their angles
+    (Thürmer and Wüthrich, "Computing Vertex Normals from Polygonal Facets", JGT 1998)."""
+    group = np.array([run.state.smoothing for run in text.runs], np.int64)[triangles.run]
+    usable = (triangles.positions >= 0).all(axis=1)
+    (chosen,) = np.nonzero((group > 0) & (triangles.normals == NOWHERE).any(axis=1) & usable)
+    if not len(chosen):
+        return text.normals
+    faces = triangles.positions[chosen]
+    keys, place = np.unique(
+        faces.astype(np.int64) * (group.max() + 1) + group[chosen][:, None], return_inverse=True
+    )
+    corners = text.vertices[faces]
+    sums = np.zeros((len(keys), 3))
+    with np.errstate(all="ignore"):
+        along = np.roll(corners, -1, axis=1) - corners
+        along /= np.linalg.norm(along, axis=2, keepdims=True)
+        flat = np.cross(along[:, 0], along[:, 1])
+        flat /= np.linalg.norm(flat, axis=1, keepdims=True)
+        cosines = -(along * np.roll(along, 1, axis=1)).sum(axis=2)
+        weighted = np.nan_to_num(np.arccos(np.clip(cosines, -1, 1))[..., None] * flat[:, None, :])
+    for axis in range(3):
+        sums[:, axis] = np.bincount(place.ravel(), weighted[..., axis].ravel(), len(keys))
+    own = triangles.normals[chosen]
+    triangles.normals[chosen] = np.where(own == NOWHERE, len(text.normals) + place.reshape(-1, 3), own)
+    return np.concatenate([text.normals, sums])
+
+
+def _mesh(
+    text: ObjText, triangles: _Triangles, normals: Array, chosen: Indices, counts: dict[str, int]
+) -> Mesh | None:
+    """The mesh of some triangles, with the vertices that they use."""
+    faces = triangles.positions[chosen]
+    is_used = np.zeros(len(text.vertices) + 1, bool)
+    is_used[np.where(faces < 0, len(text.vertices), faces)] = True
+    is_used = is_used[:-1]
+    place = np.append(np.cumsum(is_used) - 1, IMPOSSIBLE)
+    faces = place[np.where(faces < 0, len(text.vertices), faces)]
+    at_normals, at_uvs = triangles.normals[chosen], triangles.uvs[chosen]
+    colors = None
+    if text.colors is not None:
+        linear = linear_from_srgb(np.clip(text.colors[is_used], 0, 1))
+        colors = np.concatenate([linear, np.ones((len(linear), 1))], axis=1)
+    has_uvs, has_normals = bool((at_uvs >= 0).any()), bool((at_normals >= 0).any())
+    # Corners without the one or the other take what stands behind all of them.
+    uvs = (np.concatenate([text.uvs * [1, -1] + [0, 1], [[0, 0]]]),) if has_uvs else ()
+    return usable_mesh(
+        text.vertices[is_used],
+        faces,
+        np.concatenate([normals, np.full((1, 3), np.nan)]) if has_normals else None,
+        counts,
+        VertexAttributes(uvs, colors),
+        normal_at=np.where(at_normals < 0, len(normals), at_normals) if has_normals else None,
+        uv_at=np.where(at_uvs < 0, len(text.uvs), at_uvs) if has_uvs else None,
+    )
+
+
+def _materials(path: Path, text: ObjText) -> MaterialLibrary:
+    """The materials of the files that `mtllib` names. One that cannot be read is told."""
+    library = MaterialLibrary()
+    wanted = {run.state.material for run in text.runs} - {""}
+    for name in dict.fromkeys(text.libraries):
+        for one in _files(path.parent, name):
+            try:
+                check_inside(path.parent, one)
+                library.read(path.parent / one)
+            except InputError as error:
+                import_report.left_out(f"materials of {one}: {error}")
+    missing = sorted(wanted - library.materials.keys())
+    if missing and library.files:
+        others = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+        import_report.left_out(f"material {missing[0]!r}{others}: is in none of the files of materials")
+    elif missing and not text.libraries:
+        import_report.left_out(f"{len(missing)} materials: the file names no file of materials")
+    return library
+
+
+def _files(folder: Path, line: str) -> list[str]:
+    """The names in a line of `mtllib`: one with spaces, or several, whose own spaces have a backslash."""
+    if (folder / line).is_file():
+        return [line]
+    return [name.replace("\\ ", " ").replace("\\", "/") for name in re.split(r"(?<!\\)\s+", line)]
+
+
+def _tell_of_rest(text: ObjText) -> None:
+    for count, what in ((text.lines, "lines"), (text.points, "points")):
+        if count:
+            import_report.left_out(f"{count:,} {what}: have no area")
+    if text.curves:
+        import_report.left_out("curves and surfaces: only polygons are read; export them as polygons")
+    for keyword, count in text.unknown.items():
+        import_report.left_out(f"{count:,} lines with {keyword!r}: the keyword is not known")
