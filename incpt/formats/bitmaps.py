@@ -44,7 +44,7 @@ def load_bitmap(path: str | os.PathLike[str], index: int | None = None) -> Bitma
     check_readable(path)
     with in_place(str(path)):
         if index is None:
-            return _known_or(path, None, lambda: _pixels(path))
+            return _known_or(path, None, lambda: read_pixels(path))
         # It reads images by this module.
         from incpt.formats.gltf.textures import embedded_image
 
@@ -73,10 +73,12 @@ def pixels_of(content: bytes, suffix: str) -> npt.NDArray[Any]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"image{suffix}"
         path.write_bytes(content)
-        return _pixels(path)
+        return read_pixels(path)
 
 
-def _pixels(path: Path) -> npt.NDArray[Any]:
+def read_pixels(path: Path) -> npt.NDArray[Any]:
+    """(H, W, C) the pixels of a file as `load_bitmap` gives them. Raises InputError that does not name the
+    file."""
     import OpenImageIO as oiio  # noqa: N813 (its own documents call it so)
 
     config = oiio.ImageSpec()

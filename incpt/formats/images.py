@@ -24,8 +24,9 @@ from incpt.core.checks import path_of, require
 from incpt.core.errors import InputError, one_line
 from incpt.core.files import check_readable, write_atomically, write_bytes
 from incpt.core.layout import ENVIRONMENT_MAX_SIZE
-from incpt.formats import registry
+from incpt.formats import import_report, registry
 from incpt.formats.registry import OPENEXR, FileKind
+from incpt.picture.color import linear_from_srgb
 from incpt.picture.tone_mapping import tone_map_covered
 from incpt.scene.image import Image
 
@@ -100,11 +101,12 @@ def _channels(name: str, values: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]
 
 
 def load_image(path: str | os.PathLike[str]) -> Image:
-    """Reads an OpenEXR environment image: channels R, G, B (also of one layer, "name.R"), or Y alone.
+    """Reads an environment image: OpenEXR (channels R, G, B, also of one layer, "name.R"; Y alone, or with
+    chroma), Radiance (.hdr), or an image as displays show it (.png, .jpg ...).
 
-    The same file, unchanged, gives the same Image as long as that is in use. Raises InputError: a file
-    that is missing, damaged, too large or no OpenEXR, other channels, radiance that is negative or not
-    finite.
+    The same file, unchanged, gives the same Image as long as that is in use. What is changed on the way, such
+    as primaries other than those of Rec. 709, is told, see `import_report`. Raises InputError: a file that is
+    missing, damaged, too large or no image, other channels, radiance that is negative or not finite.
     """
     path = path_of("path", path)
     status = check_readable(path)
@@ -119,7 +121,25 @@ def load_image(path: str | os.PathLike[str]) -> Image:
 
 def read_exr(path: Path) -> Image:
     """The image of an OpenEXR file, see `load_image`. Raises InputError that does not name the file."""
-    return Image(_without_ringing(_pixels(path)), source=os.path.abspath(path))
+    # It mutes the library by this module.
+    from incpt.formats import exr
+
+    return Image(_without_ringing(exr.read_colors(path)), source=os.path.abspath(path))
+
+
+def read_other(path: Path) -> Image:
+    """The image of a file that is no OpenEXR: Radiance as it is, others as displays show them. Raises
+    InputError that does not name the file."""
+    from incpt.formats import bitmaps
+
+    pixels = bitmaps.read_pixels(path)
+    largest = {np.dtype(np.uint8): 255, np.dtype(np.uint16): 65535}.get(pixels.dtype)
+    colors = pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
+    if largest is not None:
+        colors = linear_from_srgb(np.arange(largest + 1) / largest).astype(np.float32)[colors]
+        import_report.changed("the environment is an image for displays: it has no bright lights")
+    _check_size(colors.shape[1], colors.shape[0])
+    return Image(np.asarray(colors, np.float32), source=os.path.abspath(path))
 
 
 def _without_ringing(pixels: Float32Image) -> Float32Image:
@@ -130,51 +150,11 @@ def _without_ringing(pixels: Float32Image) -> Float32Image:
     return pixels
 
 
-def _pixels(path: Path) -> Float32Image:
-    """(H, W, 3) linear radiance of an OpenEXR file. Raises InputError."""
-    import OpenEXR
-
-    try:
-        with muted():
-            header = OpenEXR.File(str(path), header_only=True).header()
-            _check_size(header)
-            pixels = {
-                name: channel.pixels
-                for name, channel in OpenEXR.File(str(path), separate_channels=True).channels().items()
-            }
-    except InputError:
-        raise
-    except Exception:  # The library raises RuntimeError, ValueError, TypeError … for damaged files.
-        raise InputError("is no OpenEXR image, or a damaged one; save it again as OpenEXR") from None
-    if pixels and all(isinstance(p, np.ndarray) and p.ndim == 2 for p in pixels.values()):
-        for names in _colour_names(set(pixels)):
-            planes = [pixels[name] for name in names]
-            if len({plane.shape for plane in planes}) == 1:
-                with np.errstate(invalid="ignore", over="ignore"):
-                    return np.stack(planes, axis=-1).astype(np.float32)
-    listed = ", ".join(sorted(pixels)[:12]) or "none"
-    raise InputError(f"has no channels R, G, B or Y of full size, but {listed}; save it as RGB")
-
-
-def _check_size(header: Mapping[str, Any]) -> None:
-    """Before the pixels are read: a damaged header may ask for any amount of memory."""
-    low, high = header["dataWindow"]
-    width, height = (int(high[axis]) - int(low[axis]) + 1 for axis in (0, 1))
+def _check_size(width: int, height: int) -> None:
     if not (0 < width <= ENVIRONMENT_MAX_SIZE and 0 < height <= ENVIRONMENT_MAX_SIZE):
         raise InputError(
             f"is {width} x {height} pixels; an environment image has 1 to {ENVIRONMENT_MAX_SIZE} a side"
         )
-
-
-def _colour_names(names: set[str]) -> Iterator[tuple[str, str, str]]:
-    """Channel names of red, green and blue, the plain ones first, then those of the first layer."""
-    layers = sorted(name[:-1] for name in names if name[-1:] == "R")
-    for prefix in ["", *layers]:
-        if {prefix + c for c in "RGB"} <= names:
-            yield prefix + "R", prefix + "G", prefix + "B"
-    # With RY and BY the file is luminance and subsampled chroma, of which Y alone would lose the colour.
-    if "Y" in names and not {"RY", "BY"} & names:
-        yield "Y", "Y", "Y"
 
 
 @contextmanager

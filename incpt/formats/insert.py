@@ -15,6 +15,9 @@ from incpt.scene.edits import Names
 from incpt.scene.environment import Environment
 from incpt.scene.model import Scene
 
+PANORAMAS = (".exr", ".hdr")
+"""Images with light in them, of which one that is dropped on the window is meant as environment."""
+
 
 def add_mesh(
     scene: Scene, path: str | os.PathLike[str], at: Vector | None = None, material: str | None = None
@@ -51,12 +54,17 @@ def drop_file(scene: Scene, path: str | os.PathLike[str]) -> tuple[Scene, Names]
     if kind is FileKind.MESH:
         return add_mesh(scene, path)
     if kind is FileKind.IMAGE:
+        if Path(path).suffix.lower() not in PANORAMAS:
+            raise InputError(
+                f"{path}: drop an image on the row of a texture in the Object panel, or choose it as "
+                "environment in the Scene panel"
+            )
         return set_environment_image(scene, path), ()
     raise InputError(f"{path}: is a scene; open it in place of this one")
 
 
 def set_environment_image(scene: Scene, path: str | os.PathLike[str]) -> Scene:
-    """The scene lit by an OpenEXR image at its own radiance. Raises InputError."""
+    """The scene lit by an image at its own radiance. Raises InputError."""
     image = images.load_image(path)
     old = scene.environment
     # A colour that stood alone was a radiance. Beside an image it would tint the image, or hide it by black.

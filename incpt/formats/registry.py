@@ -62,11 +62,13 @@ class Format:
 
 
 OPENEXR = Format(".exr", FileKind.IMAGE, ("images", "read_exr"))
+_OTHER_IMAGES = (".hdr", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
 _GLTF = ("gltf.reader", "read_gltf")
 _TRIMESH = ("trimesh_adapter", "read_with_trimesh")
 FORMATS = (
     Format(".toml", FileKind.SCENE, ("scene_toml", "load_scene_toml")),
     OPENEXR,
+    *(Format(suffix, FileKind.IMAGE, ("images", "read_other")) for suffix in _OTHER_IMAGES),
     Format(".glb", FileKind.MESH, _GLTF),
     Format(".gltf", FileKind.MESH, _GLTF),
     Format(".obj", FileKind.MESH, ("obj.reader", "read_obj")),
