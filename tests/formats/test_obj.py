@@ -260,18 +260,28 @@ def test_images(tmp_path: Path) -> None:
     assert material.emission == (1, 1, 1) and material.emission_texture is not None
 
 
-def test_what_a_material_loses_is_told(tmp_path: Path) -> None:
+def test_heights_and_normals_are_told_apart(tmp_path: Path) -> None:
     image(tmp_path / "heights.png", 90)
+    image(tmp_path / "normals.png", 128, 128, 255)
+    bumpy = material_of(tmp_path, "bump -bm 2 heights.png\nnorm normals.png")
+    assert bumpy.bump_texture is not None and bumpy.bump_texture.bitmap.channels == 1
+    assert bumpy.bump_scale == pytest.approx(2 * Material().bump_scale)
+    assert bumpy.normal_texture is not None and bumpy.normal_texture.bitmap.channels == 3
+    assert told(tmp_path / "a.obj", Fate.CHANGED) == [
+        "a bump map: from black to white it is taken for 0.02 m high"
+    ]
+
+
+def test_what_a_material_loses_is_told(tmp_path: Path) -> None:
     path = written(
         tmp_path,
         f"mtllib gone.mtl\n{SQUARE}usemtl m\nf 1 2 3\nusemtl other\nf 1 3 4\n",
-        "newmtl m\nKa 1 1 1\nmap_Kd C:\\textures\\gone.png\nbump heights.png\nmap_Ns shiny.png\nfoo 1\n",
+        "newmtl m\nKa 1 1 1\nmap_Kd C:\\textures\\gone.png\nmap_Ns shiny.png\nfoo 1\n",
     )
     assert told(path) == [
         "foo in a.mtl: nothing here is like it",
         "map_ns in a.mtl: roughness has a map of its own, map_Pr",
         f"image C:/textures/gone.png: {tmp_path / 'gone.png'}: no such file; check the path",
-        "a bump map: heights are not read, only normal maps are",
         f"materials of gone.mtl: {tmp_path / 'gone.mtl'}: no such file; check the path",
         "material 'other': is in none of the files of materials",
     ]

@@ -24,7 +24,7 @@ from incpt.formats import bitmaps, import_report
 from incpt.formats.obj.lines import decoded, plain_text
 from incpt.formats.outside import check_inside
 from incpt.scene.checks import LARGEST
-from incpt.scene.material import LARGEST_SLOPE, Material
+from incpt.scene.material import HIGHEST_BUMP, LARGEST_SLOPE, Material
 from incpt.scene.texture import Bitmap, Texture
 
 LARGEST_EXPONENT = 1000.0
@@ -91,20 +91,17 @@ class MaterialLibrary:
         textures = {key: self._texture(folder, *image) for key, image in entry.images.items()}
         found = {key: texture for key, texture in textures.items() if texture is not None}
         bump = found.pop("bump", None)
-        if bump is not None:
-            if "norm" not in found and _is_normal_map(bump.bitmap):
-                found["norm"] = bump
-            else:
-                import_report.left_out("a bump map: heights are not read, only normal maps are")
-        values = {**_plain(entry, found), **_bodies(entry), **_mapped(found)}
-        material = Material(**values)
+        strengths = {key: options.get("bm", 1.0) for key, (_, options) in entry.images.items()}
+        if bump is not None and "norm" not in found and _is_normal_map(bump.bitmap):
+            found["norm"], strengths["norm"], bump = bump, strengths["bump"], None
+        material = Material(**{**_plain(entry, found), **_bodies(entry), **_mapped(found)})
         if "norm" in found:
-            scale = entry.images.get("norm", entry.images.get("bump", ("", {})))[1].get("bm", 1.0)
-            material = replace(
-                material,
-                normal_texture=found["norm"],
-                normal_scale=max(-LARGEST_SLOPE, min(scale, LARGEST_SLOPE)),
-            )
+            slope = max(-LARGEST_SLOPE, min(strengths["norm"], LARGEST_SLOPE))
+            material = replace(material, normal_texture=found["norm"], normal_scale=slope)
+        if bump is not None:
+            height = max(-HIGHEST_BUMP, min(material.bump_scale * strengths["bump"], HIGHEST_BUMP))
+            material = replace(material, bump_texture=bump, bump_scale=height)
+            import_report.changed(f"a bump map: from black to white it is taken for {height:g} m high")
         return material
 
     def _texture(self, folder: Path, name: str, options: dict[str, Any]) -> Texture | None:
