@@ -110,7 +110,8 @@ def _sample_triangles(scene: Scene, share: float = 1.0) -> tuple[Array, Array, A
     u, v, choice = uniforms(COUNT, 3, 31)
     body = """Uniform2 uv; uv.u = u[i]; uv.v = v[i];
         Vec3 o = vec3(0.0f, 0.0f, 0.0f);
-        LightSample s = sample_triangle_light(&params, 0, &e, o, o, uv, choice[i]);
+        Starts starts = {o, o, o};
+        LightSample s = sample_triangle_light(&params, 0, &e, &starts, uv, choice[i]);
         x[i] = s.direction.x; y[i] = s.direction.y; z[i] = s.direction.z; d[i] = s.distance;
         r[i] = s.radiance.x; g[i] = s.radiance.y; b[i] = s.radiance.z; pdf[i] = s.pdf;"""
     results = _light_call(
