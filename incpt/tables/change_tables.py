@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,7 @@ import pyopencl as cl
 from incpt.core import affine, layout
 from incpt.device.device import Device
 from incpt.scene.change import Change, diff
+from incpt.scene.contacts import grown_bodies
 from incpt.scene.enclosing import has_in_bounds
 from incpt.scene.light import Light
 from incpt.scene.model import Object, Scene
@@ -77,9 +79,12 @@ def change_tables(device: Device, old: Scene, new: Scene) -> ChangeTables:
 def difference(old: Scene, new: Scene) -> Difference:
     """What differs between two scenes."""
     change = diff(old, new)
+    # Bodies in contact depend on each other.
+    before, after = grown_bodies(old), grown_bodies(new)
+    displaced = _displaced(change) | _regrown(before, after)
     placed = [
-        *_shown(old, _displaced(change) - change.added),
-        *_shown(new, _displaced(change) - change.removed),
+        *_shown(old, before, displaced - change.added),
+        *_shown(new, after, displaced - change.removed),
     ]
     # Rays that went through them need not end on them now, and the other way round.
     placed += [*_changed_cutouts(old, old, new, change), *_changed_cutouts(new, old, new, change)]
@@ -102,8 +107,19 @@ def _met_lights(scene: Scene, names: frozenset[str]) -> list[Light]:
     return [light for light in scene.lights if light.name in names and light.is_emissive and light.has_size]
 
 
-def _shown(scene: Scene, names: frozenset[str]) -> list[Object]:
-    return [obj for obj in map(scene.object, sorted(names)) if obj.visible]
+def _regrown(before: Mapping[str, Object], after: Mapping[str, Object]) -> frozenset[str]:
+    """The objects that are grown in one of two scenes only, or by another amount."""
+    both = before.keys() & after.keys()
+    same = {
+        name for name in both if np.array_equal(before[name].world_from_object, after[name].world_from_object)
+    }
+    return frozenset((before.keys() | after.keys()) - same)
+
+
+def _shown(scene: Scene, grown: Mapping[str, Object], names: frozenset[str]) -> list[Object]:
+    """Objects where rays meet them."""
+    found = [grown.get(name) or scene.object(name) for name in sorted(names)]
+    return [obj for obj in found if obj.visible]
 
 
 def _changed_around_camera(scene: Scene, change: Change) -> list[Object]:

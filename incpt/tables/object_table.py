@@ -16,6 +16,7 @@ import numpy.typing as npt
 import pyopencl as cl
 
 from incpt.core import affine, layout
+from incpt.scene.contacts import separated
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
 from incpt.tables.geometry_pool import GeometryPool, PooledMesh
@@ -55,7 +56,7 @@ class ObjectTable:
 
     def follow(self, scene: Scene, meshes: Mapping[Mesh, PooledMesh], packings: int) -> ObjectTable:
         """The table of another scene. Objects that are the same are not described again."""
-        objects = scene.objects
+        objects = separated(scene)
         source = self._source(objects)
         known = np.flatnonzero(source >= 0)
         sizes = np.empty(len(objects), np.int64)

@@ -20,6 +20,7 @@ from incpt.core import layout
 from incpt.core.affine import Vector
 from incpt.core.layout import TextureSlot
 from incpt.scene.change import Change, diff
+from incpt.scene.contacts import grown_bodies
 from incpt.scene.enclosing import transparent_bodies_around
 from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh
@@ -235,8 +236,16 @@ def _make(pool: GeometryPool, scene: Scene, previous: SceneTables | None) -> Sce
     change = None if previous is None else diff(previous.scene, scene)
     device = pool.device
 
+    # Bodies in contact depend on each other, and on what they are made of.
+    may_grow = (
+        previous is not None
+        and change is not None
+        and bool(change.materials)
+        and bool(grown_bodies(previous.scene) or grown_bodies(scene))
+    )
+
     def part(name: str, make: Callable[[], _Part]) -> _Part:
-        if change is None or _REBUILT_BY[name](change):
+        if change is None or _REBUILT_BY[name](change) or (may_grow and name in _PLACED):
             return make()
         kept: _Part = getattr(previous, name)
         return kept
@@ -319,6 +328,9 @@ _REBUILT_BY: Mapping[str, Callable[[Change], bool]] = {
     "materials": _emission_changed,
 }
 """Which change makes which part of the tables anew."""
+
+_PLACED = ("objects", "top_level")
+"""The parts that depend on where objects are."""
 
 _LIVING: WeakKeyDictionary[GeometryPool, WeakValueDictionary[int, SceneTables]] = WeakKeyDictionary()
 """The tables that live on each pool, by the identity of their scene, which they hold."""

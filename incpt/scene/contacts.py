@@ -1,0 +1,167 @@
+"""Transparent bodies whose faces coincide.
+
+Of two faces at one distance a ray meets one, by chance of rounding, and starts behind the other. So of two
+bodies in contact the smaller is grown by some roundings: their faces then lie in an order, and what is in
+both is sorted out by priority, as of all nested dielectrics (C. M. Schmidt and B. Budge, Simple Nested
+Dielectrics in Ray Traced Images, JGT 7(2), 2002).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+
+from incpt.core import affine
+from incpt.scene.model import Object, Scene
+
+Array = npt.NDArray[np.float64]
+
+_CONTACT = 2.0**-20
+"""How far apart planes may lie that are one, of the largest coordinate: what rounding puts between them."""
+_GROWTH = 2.0**-17
+"""By how much faces move apart, of the same: several times as far as rays keep off a surface."""
+_MOST_GROWTH = 2.0**-8
+"""A body that would have to grow by more stays as it is: one whose face in contact is close to its middle or
+looks towards it, or that is hundreds of times its size away from the origin."""
+_KEY_MARGIN = 2.0**-13
+"""How far apart the keys of planes may lie that are compared, of the largest coordinate."""
+_PAIRS_AT_ONCE = 1 << 20
+_AXIS = np.array([0.36, 0.48, 0.8])
+"""Any direction along which few planes are alike."""
+
+
+def separated(scene: Scene) -> tuple[Object, ...]:
+    """The objects of a scene as rays are to meet them, in its order: the same, but for `grown_bodies`."""
+    grown = grown_bodies(scene)
+    return tuple(grown.get(obj.name, obj) for obj in scene.objects) if grown else scene.objects
+
+
+def grown_bodies(scene: Scene) -> dict[str, Object]:
+    """The bodies of a scene that are in contact with a larger one, by name, as they are grown."""
+    bodies = [obj for obj in scene.objects if obj.visible and scene.material(obj.material).is_body]
+    # The largest first; each is grown by more than those that it touches.
+    bodies.sort(key=lambda obj: -float(np.prod(np.ptp(obj.world_bounds, axis=0))))
+    bounds = np.array([obj.world_bounds for obj in bodies]).reshape(-1, 2, 3)
+    levels: list[int] = []
+    found: dict[str, Object] = {}
+    for place, obj in enumerate(bodies):
+        heights, level, reach = [], 0, 0.0
+        for other in _boxes_met(bounds[:place], bounds[place]):
+            touching = _touching(_faces_of(obj), _faces_of(bodies[other]))
+            if touching.any():
+                heights.append(_faces_of(obj).height[touching].min())
+                level, reach = max(level, levels[other] + 1), max(reach, _reach(obj, bodies[other]))
+        levels.append(level)
+        share = level * _GROWTH * reach / min(heights) if heights and min(heights) > 0 else 0.0
+        if 0 < share <= _MOST_GROWTH:
+            found[obj.name] = _grown(obj, share)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Faces:
+    """The faces of a body in world space: corners (F, 3, 3), unit normals (F, 3), and the height (F,) of each
+    over the middle of the body, below 0 where the face looks towards it."""
+
+    corners: Array
+    normal: Array
+    height: Array
+
+
+def _faces_of(obj: Object) -> _Faces:
+    faces = _KNOWN.get(obj)
+    if faces is None:
+        faces = _KNOWN[obj] = _make_faces(obj)
+    return faces
+
+
+def _make_faces(obj: Object) -> _Faces:
+    matrix = obj.world_from_object
+    corners = affine.apply(matrix, obj.mesh.vertices.astype(np.float64))[obj.mesh.faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    corners, normal = corners[length[:, 0] > 0], normal[length[:, 0] > 0] / length[length[:, 0] > 0]
+    outside = normal * np.sign(np.linalg.det(matrix[:, :3]))
+    return _Faces(corners, normal, np.sum((corners[:, 0] - _middle(obj)) * outside, axis=1))
+
+
+def _middle(obj: Object) -> Array:
+    return np.asarray(obj.world_bounds.mean(axis=0))
+
+
+def _reach(*objects: Object) -> float:
+    """The largest coordinate."""
+    return float(max(np.abs(obj.world_bounds).max() for obj in objects))
+
+
+def _boxes_met(boxes: Array, box: Array) -> list[int]:
+    """The numbers of the boxes (N, 2, 3) that a box (2, 3) touches."""
+    slack = _CONTACT * max(np.abs(boxes).max(initial=0.0), np.abs(box).max())
+    meet = (boxes[:, 0] <= box[1] + slack) & (box[0] <= boxes[:, 1] + slack)
+    return np.flatnonzero(meet.all(axis=1)).tolist()
+
+
+def _touching(a: _Faces, b: _Faces) -> npt.NDArray[np.bool_]:
+    """(F,) which faces of a body lie in the plane of a face of another one, whose box they meet."""
+    slack = _CONTACT * max(float(np.abs(faces.corners).max()) for faces in (a, b))
+    found = np.zeros(len(a.corners), np.bool_)
+    first, second = _near(a, b, slack), _near(b, a, slack)
+    if not (len(first) and len(second)):
+        return found
+    center = a.corners[first[0], 0]
+    keys = [_plane_key(faces, chosen, center) for faces, chosen in ((a, first), (b, second))]
+    order = np.argsort(keys[1])
+    ordered, second = keys[1][order], second[order]
+    # Small faces that coincide have normals that differ by rounding.
+    margin = _KEY_MARGIN / _CONTACT * slack
+    begin, end = (np.searchsorted(ordered, keys[0] + side * margin) for side in (-1, 1))
+    ends = np.cumsum(end - begin)
+    for start in range(0, int(ends[-1]), _PAIRS_AT_ONCE):
+        pair = np.arange(start, min(start + _PAIRS_AT_ONCE, int(ends[-1])))
+        row = np.searchsorted(ends, pair, side="right")
+        one = first[row]
+        other = second[begin[row] + pair - (ends[row] - (end - begin)[row])]
+        found[one[_coincide(a, one, b, other, slack)]] = True
+    return found
+
+
+def _near(a: _Faces, b: _Faces, slack: float) -> npt.NDArray[np.int64]:
+    """The faces of `a` that meet the box around `b`."""
+    low, high = b.corners.min(axis=(0, 1)) - slack, b.corners.max(axis=(0, 1)) + slack
+    inside = (a.corners.max(axis=1) >= low).all(axis=1) & (a.corners.min(axis=1) <= high).all(axis=1)
+    return np.flatnonzero(inside)
+
+
+def _plane_key(faces: _Faces, chosen: npt.NDArray[np.int64], center: Array) -> Array:
+    """A number for each plane, whichever side its normal is on."""
+    normal = faces.normal[chosen]
+    return np.asarray((normal @ _AXIS) * np.sum((faces.corners[chosen, 0] - center) * normal, axis=1))
+
+
+def _coincide(
+    a: _Faces, one: npt.NDArray[np.int64], b: _Faces, other: npt.NDArray[np.int64], slack: float
+) -> npt.NDArray[np.bool_]:
+    """Whether pairs of faces lie in one plane, the corners of the smaller in that of the larger, and their
+    boxes meet."""
+    corners, others = a.corners[one], b.corners[other]
+    apart = np.abs(np.sum((corners - others[:, :1]) * b.normal[other][:, None], axis=2)).max(axis=1)
+    back = np.abs(np.sum((others - corners[:, :1]) * a.normal[one][:, None], axis=2)).max(axis=1)
+    meet = (corners.max(axis=1) >= others.min(axis=1) - slack) & (
+        corners.min(axis=1) <= others.max(axis=1) + slack
+    )
+    return np.asarray((np.minimum(apart, back) <= slack) & meet.all(axis=1))
+
+
+def _grown(obj: Object, share: float) -> Object:
+    """The object grown about its middle by such a share of its size."""
+    matrix = obj.world_from_object.copy()
+    matrix[:, :3] *= 1 + share
+    matrix[:, 3] = _middle(obj) + (1 + share) * (matrix[:, 3] - _middle(obj))
+    return Object(obj.name, obj.mesh, obj.material, visible=obj.visible, matrix=matrix)
+
+
+_KNOWN: WeakKeyDictionary[Object, _Faces] = WeakKeyDictionary()
+"""The faces of bodies that were asked for, as long as those live: a drag asks again and again."""
