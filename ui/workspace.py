@@ -23,7 +23,7 @@ from incpt.ui.panels import name as name_panel
 from incpt.ui.panels import notices, outliner, plots, render, tool, transform
 from incpt.ui.panels import textures as textures_panel
 from incpt.ui.rect import Rect
-from incpt.ui.widgets import places, widgets
+from incpt.ui.widgets import focus, places, widgets
 from incpt.ui.widgets.refusals import Refusals
 
 
@@ -41,6 +41,7 @@ class Workspace:
         """Draw menus, panels and dialogs, and take what they return; returns the rectangle that is left for
         the picture, in points."""
         places.begin_frame()
+        focus.begin_frame()
         chosen = menus.draw_menu_bar(editor)
         if chosen is not None:
             editor.attempt(lambda: chosen(editor))

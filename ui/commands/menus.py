@@ -12,7 +12,7 @@ from incpt.ui.commands import files
 from incpt.ui.commands.command import Action, Command
 from incpt.ui.commands.table import COMMANDS, MENUS
 from incpt.ui.editor.editor import Editor
-from incpt.ui.widgets import places
+from incpt.ui.widgets import focus, places
 
 _MODIFIERS = {
     "Ctrl": imgui.Key.mod_ctrl,
@@ -45,7 +45,7 @@ def draw_menu_bar(editor: Editor) -> Action | None:
 def pressed_command(editor: Editor) -> Command | None:
     """The command whose keys went down in this frame; none while a text is typed, a dialog is open or the
     camera flies, whose keys are letters."""
-    if imgui.get_io().want_text_input or editor.dialog is not None or editor.gesture.is_flying:
+    if focus.is_typing() or editor.dialog is not None or editor.gesture.is_flying:
         return None
     if imgui.is_key_pressed(imgui.Key.escape, False) and imgui.is_popup_open("", _ANY_POPUP):
         imgui.internal.close_popup_to_level(0, True)

@@ -11,12 +11,16 @@ _drawing: dict[str, Rect[float]] = {}
 """Places noted in the frame that is being drawn."""
 _drawn: dict[str, Rect[float]] = {}
 """Places noted in the frame before."""
+_hidden = [False, False]
+"""Whether the widget that the hand is at was cut off altogether, in the frame that is drawn and in the one
+before."""
 
 
 def begin_frame() -> None:
     """What was noted so far becomes the frame before."""
     global _drawing, _drawn
     _drawn, _drawing = _drawing, {}
+    _hidden[:] = False, _hidden[0]
 
 
 def note(name: str) -> None:
@@ -27,11 +31,18 @@ def note(name: str) -> None:
     right, bottom = min(high.x, clip.max.x), min(high.y, clip.max.y)
     if left < right and top < bottom:
         _drawing[name] = Rect(left, top, right - left, bottom - top)
+    elif imgui.is_item_active():
+        _hidden[0] = True
 
 
 def note_rect(name: str, rect: Rect[float]) -> None:
     """Remember a place that is no widget of imgui."""
     _drawing[name] = rect
+
+
+def is_active_hidden() -> bool:
+    """Whether the widget that is dragged or typed into was out of sight in the frame before."""
+    return _hidden[1]
 
 
 def find(name: str) -> Rect[float] | None:
