@@ -31,10 +31,11 @@ def take_frame(
         editor.preferences,
         picture,
         is_blocked=editor.dialog is not None,
+        beginning=editor.gesture.beginning,
     )
     _take_outcome(editor, outcome)
     captions.draw(editor.frame, overlay, editor.preferences.display, picture)
-    editor.settle(viewport.is_held or imgui.is_any_item_active(), viewport.is_flying)
+    editor.settle(viewport.is_held or imgui.is_any_item_active(), viewport.is_flying, viewport.hint)
     return area
 
 

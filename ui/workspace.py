@@ -45,7 +45,8 @@ class Workspace:
         chosen = menus.draw_menu_bar(editor)
         if chosen is not None:
             editor.attempt(lambda: chosen(editor))
-        notices.draw_status_bar(notices.status_text(editor.frame, editor.control.paused, editor.selection))
+        status = notices.status_text(editor.frame, editor.control.paused, editor.selection)
+        notices.draw_status_bar(editor.gesture.hint or status)
         area = self._layout.dock(editor.screen.wants_first_layout)
         editor.screen = replace(editor.screen, wants_first_layout=False)
         self._window("Outliner", editor, self._draw_outliner)

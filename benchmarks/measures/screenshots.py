@@ -120,7 +120,7 @@ def draw_editor(hand: Hand, spp: int) -> Pixels:
     hand.app.editor.control = replace(hand.app.editor.control, target_spp=None)
     hand.click(hand.in_picture(0.448, 0.75))
     hand.pump(lambda: hand.app.editor.selection.names == (OBJECT,), timeout=30)
-    hand.key("r")
+    choose(hand, "menu Edit", "Rotate handles")
     x, y = hand.middle("gizmo")
     # The ring about y passes below the middle, in front of the cube.
     start = x + 30, y + 27
@@ -130,9 +130,15 @@ def draw_editor(hand: Hand, spp: int) -> Pixels:
         hand.pump(lambda: _is_incremental(hand) and _queue_done(hand) >= 420, timeout=3600)
         pixels = hand.screenshot()
     hand.key("ctrl+z")
-    hand.key("g")
-    hand.key("Escape")
+    choose(hand, "menu Edit", "Move handles")
+    hand.key("alt+a")
     return pixels
+
+
+def choose(hand: Hand, menu: str, entry: str) -> None:
+    """Choose an entry of a menu."""
+    hand.click(menu)
+    hand.click(entry)
 
 
 def _queue_done(hand: Hand) -> int:
@@ -148,7 +154,7 @@ def draw_split(hand: Hand, spp: int) -> Pixels:
     bar = hand.middle("split bar")
     hand.drag(bar, (hand.in_picture(0.452, 0.5)[0], bar[1]))
     turn_cube(hand)
-    hand.key("Escape")
+    hand.key("alt+a")
     hand.show_tab("Render")
     stop_after(hand, 340)
     pixels = hand.screenshot()
@@ -165,7 +171,7 @@ def draw_modes(hand: Hand, spp: int) -> Pixels:
     refine(hand, spp)
     cells.append((picture(hand), f"2. Refine: {spp} samples per pixel"))
     turn_cube(hand)
-    hand.key("Escape")
+    hand.key("alt+a")
     stop_after(hand, 72)
     cells.append((picture(hand), "3. Incremental: the edit, from its middle outwards"))
     refine(hand, spp)
@@ -176,7 +182,7 @@ def draw_modes(hand: Hand, spp: int) -> Pixels:
 def draw_overlays(hand: Hand, spp: int) -> Pixels:
     """What can be laid over the picture, in the middle of an edit."""
     turn_cube(hand)
-    hand.key("Escape")
+    hand.key("alt+a")
     stop_after(hand, 420)
     hand.show_tab("Method")
     cells = []
@@ -205,7 +211,7 @@ def draw_method(hand: Hand, spp: int) -> Pixels:
     hand.key("F9")
     hand.key("ctrl+z")
     hand.key("ctrl+z")
-    hand.key("Escape")
+    hand.key("alt+a")
     hand.key("F6")
     hand.pump(lambda: editor.frame is not None and len(editor.frame.pictures) == 2, timeout=60)
     refine(hand, spp)
@@ -216,7 +222,7 @@ def draw_method(hand: Hand, spp: int) -> Pixels:
     editor.control = replace(editor.control, paused=True)
     hand.key("ctrl+shift+z")
     hand.key("ctrl+shift+z")
-    hand.key("Escape")
+    hand.key("alt+a")
     stop_after(hand, 600)
     return hand.screenshot()
 

@@ -181,7 +181,8 @@ def _drag_gizmo(soak: Soak) -> None:
 
     if soak.select_one() is None or places.find("gizmo") is None:
         return
-    soak.hand.key(soak.random.choice("grs"))
+    soak.hand.click("menu Edit")
+    soak.hand.click(soak.random.choice(("Move handles", "Rotate handles", "Scale handles")))
     x, y = soak.hand.middle("gizmo")
     picture = soak.hand.place("picture")
     is_across = picture.left + 40 < x < picture.right - 120
@@ -193,10 +194,37 @@ def _drag_gizmo(soak: Soak) -> None:
     soak.take_over(lambda old, new: _others(old, names) == _others(new, names))
 
 
+def _transform_by_keys(soak: Soak) -> None:
+    """G, R or S with an axis, by the mouse or a typed number, and kept or given up."""
+    name = soak.select_one()
+    if name is None:
+        return
+    operation, axis = soak.random.choice("grs"), soak.random.choice("xyz")
+    number, end = soak.random.choice(("", "0.5", "1+0.25", "-0.75")), soak.random.choice(("Return", "Escape"))
+    soak.say(f"{operation} {axis} {number} {end}")
+    before, model = soak.hand.app.editor.scene, soak.model
+    soak.hand.move(soak.hand.in_picture(0.6, 0.5))
+    soak.hand.key(operation)
+    soak.hand.move(soak.hand.in_picture(soak.random.uniform(0.3, 0.7), soak.random.uniform(0.3, 0.7)))
+    soak.hand.key(axis)
+    soak.hand.type(number)
+    soak.hand.key(end)
+    if end == "Escape":
+        if soak.hand.app.editor.scene is not before:
+            raise SoakError("a transform that was given up leaves another scene")
+        return
+    soak.take_over(lambda old, new: _others(old, (name,)) == _others(new, (name,)))
+    if operation == "g" and number and model.scene.object(name).visible:
+        wanted = list(before.object(name).position)
+        wanted["xyz".index(axis)] += {"0.5": 0.5, "1+0.25": 1.25, "-0.75": -0.75}[number]
+        if model.scene.object(name).position != tuple(wanted):
+            raise SoakError(f"{name} is at {model.scene.object(name).position} instead of {wanted}")
+
+
 def _delete(soak: Soak) -> None:
     name = soak.select_one()
     if name is not None and len(soak.model.scene.objects) > 3:
-        soak.hand.key("Delete")
+        soak.hand.key(soak.random.choice(("Delete", "x")))
         kept = tuple(o for o in soak.model.scene.objects if o.name != name)
         soak.model.push(replace(soak.model.scene, objects=kept))
 
@@ -205,6 +233,7 @@ def _duplicate(soak: Soak) -> None:
     if len(soak.model.scene.objects) < MOST_OBJECTS and soak.select_one() is not None:
         count = len(soak.model.scene.objects)
         soak.hand.key("shift+d")
+        soak.hand.key("Escape")  # the copy stays in its place
         soak.take_over(lambda old, new: new.objects[:count] == old.objects and len(new.objects) == count + 1)
 
 
@@ -330,7 +359,8 @@ def _export(soak: Soak) -> None:
 
 
 _ACTIONS: dict[Callable[[Soak], None], float] = {
-    _type_transform: 10, _type_nonsense: 2, _drag_transform: 8, _drag_gizmo: 8, _delete: 2, _duplicate: 2,
+    _type_transform: 10, _type_nonsense: 2, _drag_transform: 8, _drag_gizmo: 8, _transform_by_keys: 8,
+    _delete: 2, _duplicate: 2,
     _add: 2, _hide_or_show: 4, _rename: 1, _move_camera: 6, _wheel: 3, _undo_redo: 8, _pick: 8, _press_key: 8,
     _choose_overlay: 3, _open_menus: 2, _show_help: 1, _save: 3, _open: 1, _export: 0.5,
 }  # fmt: skip

@@ -9,23 +9,21 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core import affine
 from incpt.core.affine import Vector
 from incpt.core.errors import InputError
+from incpt.scene import placing
 from incpt.scene.camera import Camera
-from incpt.scene.checks import LARGEST
 from incpt.scene.light import Light
 from incpt.scene.material import Material
 from incpt.scene.mesh_part import MeshPart
 from incpt.scene.model import CAMERA_NAME, Object, Placed, Scene
 from incpt.scene.shapes import shape
-from incpt.scene.transform import SMALLEST_SCALE, Transform
 
 Names = tuple[str, ...]
 
@@ -40,10 +38,6 @@ LIGHT_NAMES = {
     "sphere": "sphere light",
 }
 """What lights of each kind are called."""
-_SAME_ROTATION_DEG = 1e-4
-"""Angles that differ by less are the same: a gizmo's matrices are float32."""
-_RIGID = 1e-5
-"""Factors of matrices that differ by less are the same for that reason: nothing was turned, or scaled."""
 
 
 # ------------------------------------------------------------------------------------------ new objects
@@ -111,7 +105,7 @@ def add_light(scene: Scene, kind: str) -> tuple[Scene, Names]:
     values: dict[str, Any] = {"radius": 0.05 * height, "size": (0.5 * height, 0.5 * height)}
     if kind != "sun":
         values["power"] = 25 * height**2
-    position = _within((x, y + height, z))
+    position = placing.within_range((x, y + height, z))
     new = Light(name, kind, position, (-50, 30, 0) if kind == "sun" else (-90, 0, 0), **values)
     return scene.with_added_light(new), (new.name,)
 
@@ -131,6 +125,41 @@ def duplicate(scene: Scene, names: Iterable[str]) -> tuple[Scene, Names]:
             scene = scene.with_added(replace(one, name=copy))
         copies.append(copy)
     return scene, tuple(copies)
+
+
+@dataclass(frozen=True)
+class Copied:
+    """Objects and lights taken out of a scene to be added to it or another, with the objects' materials."""
+
+    placed: tuple[Placed, ...] = ()
+    materials: Mapping[str, Material] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        return bool(self.placed)
+
+
+def copied(scene: Scene, names: Iterable[str]) -> Copied:
+    """Copies of the named objects and lights. Raises InputError for unknown names."""
+    placed = tuple(scene.placed(name) for name in names)
+    used = dict.fromkeys(one.material for one in placed if isinstance(one, Object))
+    return Copied(placed, {name: scene.material(name) for name in used})
+
+
+def paste(scene: Scene, copied: Copied) -> tuple[Scene, Names]:
+    """The scene with what was copied, under new names where these are taken; the names. A material comes
+    along under another name where the scene has a different one of that name."""
+    names: list[str] = []
+    brought: dict[str, str] = {}
+    for name, material in copied.materials.items():
+        scene, brought[name] = _with_brought(scene, name, material)
+    for one in copied.placed:
+        name = unique_name(one.name, scene.names)
+        if isinstance(one, Light):
+            scene = scene.with_added_light(replace(one, name=name))
+        else:
+            scene = scene.with_added(replace(one, name=name, material=brought[one.material]))
+        names.append(name)
+    return scene, tuple(names)
 
 
 def delete(scene: Scene, names: Iterable[str]) -> Scene:
@@ -203,14 +232,7 @@ def transform_objects(
     """
     matrix = np.asarray(delta, np.float64)
     about = np.asarray(pivot, np.float64)
-    changed = {}
-    for name in dict.fromkeys(names):
-        one = scene.placed(name)
-        world = one.transform.world_from_object
-        linear = matrix[:3, :3] @ world[:, :3]
-        position = matrix[:3, :3] @ (world[:, 3] - about) + about + matrix[:3, 3]
-        changed[name] = _moved(one, np.column_stack([linear, position]), matrix[:3, :3])
-    return with_all(scene, changed)
+    return with_all(scene, {name: placing.transformed(scene.placed(name), matrix, about) for name in names})
 
 
 # -------------------------------------------------------------------------------------------- materials
@@ -315,47 +337,6 @@ def _standing_on(at: Sequence[float], bounds: npt.NDArray[np.floating[Any]]) -> 
     """The position at which a box stands with the middle of its bottom on a point."""
     low, high = np.asarray(bounds, np.float64)
     return _vector(np.asarray(at) - [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-
-
-def _moved(one: Placed, world: npt.NDArray[np.float64], turn: npt.NDArray[np.float64]) -> Placed:
-    """An object or light under another matrix (3, 4), which `turn` (3, 3) made of its own."""
-    world = np.column_stack([world[:, :3], _within(world[:, 3])])
-    if one.transform.matrix is None:
-        transform = _without_shear(one.transform, world, turn)
-    else:
-        try:
-            transform = one.transform.moved_to(world)
-        except InputError:
-            transform = one.transform
-    return replace(one, transform=transform)
-
-
-def _without_shear(
-    old: Transform, world: npt.NDArray[np.float64], turn: npt.NDArray[np.float64]
-) -> Transform:
-    """Position, rotation and scale nearest to a matrix (3, 4), which `turn` (3, 3) made of the old one; the
-    old ones themselves as far as they stay the same, and where the matrix flattens the object."""
-    position = _vector(world[:, 3])
-    if np.abs(turn - np.eye(3)).max() < _RIGID:
-        return replace(old, position=position)
-    try:
-        _, rotation, scale = affine.decompose(world, old.rotation, old.scale)
-    except np.linalg.LinAlgError:
-        return old
-    is_turned_only = np.abs(turn @ turn.T - np.eye(3)).max() < _RIGID and np.linalg.det(turn) > 0
-    is_scaled_only = np.abs(np.subtract(rotation, old.rotation)).max() < _SAME_ROTATION_DEG
-    return Transform(
-        position,
-        old.rotation if is_scaled_only else rotation,
-        old.scale if is_turned_only else _within(scale, SMALLEST_SCALE),
-    )
-
-
-def _within(values: Sequence[float] | npt.NDArray[np.float64], smallest: float = 0.0) -> Vector:
-    """Three numbers brought into the range that a scene allows."""
-    numbers = np.asarray(values, np.float64)
-    sizes = np.clip(np.abs(numbers), smallest, LARGEST)
-    return _vector(np.copysign(sizes, numbers))
 
 
 def _vector(values: npt.NDArray[np.float64]) -> Vector:

@@ -7,6 +7,12 @@ from dataclasses import dataclass
 
 from incpt.ui.editor.editor import Editor
 
+_PRINTED = {
+    "KeypadDecimal": "Numpad .", "Comma": ",", "Escape": "Esc", "Grave_accent": "`",
+    **{f"Keypad{digit}": f"Numpad {digit}" for digit in range(10)},
+}  # fmt: skip
+"""What is printed on keys, where it is not their name in the table of commands."""
+
 Action = Callable[[Editor], object]
 """What a command does. What it refuses it raises; the editor shows it."""
 Test = Callable[[Editor], bool]
@@ -16,8 +22,8 @@ Test = Callable[[Editor], bool]
 @dataclass(frozen=True)
 class Command:
     """`menu` may name a submenu after a slash; a line is drawn in menus where `group` changes. `keys` such
-    as "Ctrl+Shift+S"; `plain_keys` where the plain set differs. `checked` for what is on or off;
-    `detail` stands behind the name in menus: what would be undone."""
+    as "Ctrl+Shift+S", several after commas; `plain_keys` where the plain set differs. `checked` for what is
+    on or off; `detail` stands behind the name in menus: what would be undone."""
 
     name: str
     menu: str
@@ -30,9 +36,16 @@ class Command:
     group: int = 0
     help: str = ""
 
-    def keys_in(self, navigation: str) -> str:
-        """The keys in one of the two sets; empty where it has none."""
-        return self.plain_keys if navigation == "plain" and self.plain_keys is not None else self.keys
+    def keys_in(self, navigation: str) -> tuple[str, ...]:
+        """The keys in one of the two sets, each of which is enough; none where it has none."""
+        keys = self.plain_keys if navigation == "plain" and self.plain_keys is not None else self.keys
+        return tuple(keys.split(", ")) if keys else ()
+
+    def printed_keys(self, navigation: str) -> tuple[str, ...]:
+        """The same as people read them on a keyboard: "Ctrl + Numpad 1"."""
+        return tuple(
+            " + ".join(_PRINTED.get(key, key) for key in keys.split("+")) for keys in self.keys_in(navigation)
+        )
 
     def is_enabled(self, editor: Editor) -> bool:
         return self.enabled is None or self.enabled(editor)

@@ -43,17 +43,16 @@ def draw_menu_bar(editor: Editor) -> Action | None:
 
 
 def pressed_command(editor: Editor) -> Command | None:
-    """The command whose keys went down in this frame; none while a text is typed, a dialog is open or the
-    camera flies, whose keys are letters."""
-    if focus.is_typing() or editor.dialog is not None or editor.gesture.is_flying:
+    """The command whose keys went down in this frame; none while a text is typed, a dialog is open, or what
+    is under way in the picture takes the keys."""
+    if focus.is_typing() or editor.dialog is not None or editor.gesture.takes_keys:
         return None
     if imgui.is_key_pressed(imgui.Key.escape, False) and imgui.is_popup_open("", _ANY_POPUP):
         imgui.internal.close_popup_to_level(0, True)
         return None
     navigation = editor.preferences.navigation
     for one in COMMANDS:
-        keys = one.keys_in(navigation)
-        if keys and imgui.is_key_chord_pressed(key_chord(keys)):
+        if any(imgui.is_key_chord_pressed(key_chord(keys)) for keys in one.keys_in(navigation)):
             return one
     return None
 
@@ -94,7 +93,7 @@ def _draw_commands(editor: Editor, commands: list[Command]) -> Action | None:
     chosen = None
     for one in commands:
         is_checked = one.checked is not None and one.checked(editor)
-        keys = one.keys_in(editor.preferences.navigation)
+        keys = next(iter(one.printed_keys(editor.preferences.navigation)), "")
         detail = one.detail(editor) if one.detail is not None else None
         label = f"{one.name} {detail}###{one.name}" if detail else one.name
         pressed, _ = imgui.menu_item(label, keys, is_checked, one.is_enabled(editor))

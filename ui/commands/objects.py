@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from incpt.scene import edits
 from incpt.scene.selection import Selection
 from incpt.scene.transform import IDENTITY
 from incpt.ui.dialogs.text_field import TextField
 from incpt.ui.editor.editor import Editor
+from incpt.ui.editor.state import TRANSFORM_KEY
 
 
 def select_all(editor: Editor) -> None:
     """Select every object and light that is shown."""
     editor.select(Selection.all_of(editor.scene))
+
+
+def select_none(editor: Editor) -> None:
+    """Deselect."""
+    editor.select(Selection())
+
+
+def cancel(editor: Editor) -> None:
+    """Give up the drag under way; without one, deselect in the plain set, as other tools do."""
+    is_given_up = editor.cancel_drag()
+    if not is_given_up and editor.preferences.navigation == "plain":
+        select_none(editor)
 
 
 def add_shape(editor: Editor, shape: str) -> None:
@@ -30,6 +45,24 @@ def duplicate(editor: Editor) -> None:
     """Copies of the selected objects, selected."""
     scene, names = edits.duplicate(editor.scene, editor.selection.names)
     editor.propose(scene, "Duplicate", selection=Selection(names))
+
+
+def duplicate_and_move(editor: Editor) -> None:
+    """Copies of the selected objects, selected, that the mouse moves at once: one edit in the history."""
+    scene, names = edits.duplicate(editor.scene, editor.selection.names)
+    editor.propose(scene, "Duplicate", TRANSFORM_KEY, selection=Selection(names))
+    editor.begin("move", "Duplicate")
+
+
+def copy(editor: Editor) -> None:
+    """Remember the selected objects and lights, with their materials."""
+    editor.copied = edits.copied(editor.scene, editor.selection.names)
+
+
+def paste(editor: Editor) -> None:
+    """Add what was copied, selected."""
+    scene, names = edits.paste(editor.scene, editor.copied)
+    editor.propose(scene, "Paste", selection=Selection(names))
 
 
 def delete(editor: Editor) -> None:
@@ -65,6 +98,17 @@ def show_all(editor: Editor) -> None:
     scene = editor.scene
     hidden = tuple(one.name for one in scene.everything if not one.visible)
     editor.propose(edits.set_visible(editor.scene, hidden, True), "Show all")
+
+
+def clear(editor: Editor, part: str) -> None:
+    """The position, rotation or scale of the selected objects as that of a new one."""
+    changed = {}
+    for name in editor.selection.names:
+        one = editor.scene.placed(name)
+        if getattr(one, part) != getattr(IDENTITY, part):
+            changed[name] = replace(one, **{part: getattr(IDENTITY, part)})
+    if changed:
+        editor.propose(edits.with_all(editor.scene, changed), f"Clear {part}")
 
 
 def reset_transform(editor: Editor) -> None:

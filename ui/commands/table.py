@@ -28,6 +28,10 @@ def _selected(editor: Editor) -> bool:
     return bool(editor.selection)
 
 
+def _shows_selected(editor: Editor) -> bool:
+    return any(editor.scene.placed(name).visible for name in editor.selection.names)
+
+
 def _has_objects(editor: Editor) -> bool:
     return bool(editor.scene.names)
 
@@ -89,6 +93,14 @@ def _add_light(kind: str) -> Action:
     return lambda editor: objects.add_light(editor, kind)
 
 
+def _begin(action: str, label: str) -> Action:
+    return lambda editor: editor.begin(action, label)
+
+
+def _clear(part: str) -> Action:
+    return lambda editor: objects.clear(editor, part)
+
+
 def _switch_space(editor: Editor) -> None:
     editor.tool = replace(editor.tool, space="local" if editor.tool.space == "world" else "world")
 
@@ -129,34 +141,59 @@ COMMANDS: tuple[Command, ...] = (
             help="Do it again"),
     Command("Select all", "Edit", objects.select_all, "A", plain_keys="Ctrl+A", enabled=_has_objects, group=1,
             help="Select every visible object and light"),
-    Command("Select none", "Edit", Editor.cancel, "Escape", group=1,
-            help="Deselect; during a drag: give it up"),
-    Command("Move", "Edit", _tool("move"), "G", plain_keys="W", group=2, checked=_uses("move"),
+    Command("Select none", "Edit", objects.select_none, "Alt+A", plain_keys="Ctrl+Shift+A", group=1,
+            help="Deselect"),
+    Command("Cancel", "Edit", objects.cancel, "Escape", group=1,
+            help="Give up a drag; in the plain set, without one: deselect"),
+    Command("Copy", "Edit", objects.copy, "Ctrl+C", enabled=_selected, group=2,
+            help="Remember the selected objects and lights, with their materials"),
+    Command("Paste", "Edit", objects.paste, "Ctrl+V", enabled=lambda e: bool(e.copied), group=2,
+            help="Add what was copied, also from another scene"),
+    Command("Move handles", "Edit", _tool("move"), plain_keys="W", group=3, checked=_uses("move"),
             help="Arrows that move what is selected"),
-    Command("Rotate", "Edit", _tool("rotate"), "R", plain_keys="E", group=2, checked=_uses("rotate"),
+    Command("Rotate handles", "Edit", _tool("rotate"), plain_keys="E", group=3, checked=_uses("rotate"),
             help="Rings that turn it"),
-    Command("Scale", "Edit", _tool("scale"), "S", plain_keys="R", group=2, checked=_uses("scale"),
+    Command("Scale handles", "Edit", _tool("scale"), plain_keys="R", group=3, checked=_uses("scale"),
             help="Handles that scale it"),
-    Command("Local axes", "Edit", _switch_space, "Comma", plain_keys="L", group=3,
-            checked=lambda e: e.tool.space == "local", help="Move and rotate about the object's own axes"),
-    Command("Snap", "Edit", _switch_snap, "Shift+Tab", plain_keys="X", group=3,
+    Command("Local axes", "Edit", _switch_space, "Comma", plain_keys="L", group=4,
+            checked=lambda e: e.tool.space == "local",
+            help="The handles move and rotate about the object's own axes"),
+    Command("Snap", "Edit", _switch_snap, "Shift+Tab", plain_keys="X", group=4,
             checked=lambda e: e.preferences.snap.enabled, help="Move, rotate and scale in steps"),
     *(Command(shape.capitalize(), "Object/Add", _add(shape), help=f"Add a {shape} where the camera looks")
       for shape in SHAPES),
     *(Command(name.capitalize(), "Object/Add", _add_light(kind), help=f"Add a {name} above what is looked at")
       for kind, name in LIGHT_NAMES.items()),
-    Command("Duplicate", "Object", objects.duplicate, "Shift+D", plain_keys="Ctrl+D", enabled=_selected,
-            group=1, help="Copy the selected objects"),
-    Command("Delete", "Object", objects.delete, "Delete", enabled=_selected, group=1,
+    Command("Move", "Object/Transform", _begin("move", "Move"), "G", enabled=_shows_selected,
+            help="The mouse moves what is selected until a click or Enter; Esc or a right click gives it up. "
+                 "X, Y and Z: along an axis, pressed again along the object's own; with Shift in a plane. "
+                 "Digits, sums and minus: by so much. Ctrl: in steps. Shift: finer"),
+    Command("Rotate", "Object/Transform", _begin("rotate", "Rotate"), "R", plain_keys="Shift+R",
+            enabled=_shows_selected,
+            help="The mouse turns it, with the same keys; without an axis about the line of sight. "
+                 "R alone is for the handles in the plain set"),
+    Command("Scale", "Object/Transform", _begin("scale", "Scale"), "S", enabled=_shows_selected,
+            help="The mouse scales it, with the same keys"),
+    Command("Duplicate", "Object", objects.duplicate, plain_keys="Ctrl+D", enabled=_selected,
+            group=1, help="Copy the selected objects, in their place"),
+    Command("Duplicate and move", "Object", objects.duplicate_and_move, "Shift+D", enabled=_shows_selected,
+            group=1, help="Copy the selected objects, and move the copies by the mouse"),
+    Command("Delete", "Object", objects.delete, "X, Delete", plain_keys="Delete", enabled=_selected, group=1,
             help="Remove the selected objects"),
     Command("Rename…", "Object", objects.rename, "F2", enabled=_selected, group=1, help="Give another name"),
     Command("Hide", "Object", objects.hide, "H", enabled=_selected, group=2,
             help="Hide the selected objects"),
     Command("Show all", "Object", objects.show_all, "Alt+H", plain_keys="Shift+H", group=2,
             help="Show hidden objects again"),
-    Command("Reset transform", "Object", objects.reset_transform, "Alt+G", plain_keys="", enabled=_selected,
-            group=3, help="Position 0, rotation 0, scale 1"),
-    Command("Frame selected", "View", camera.frame_selected, "KeypadDecimal", plain_keys="F",
+    Command("Clear position", "Object/Clear", _clear("position"), "Alt+G", enabled=_selected, group=3,
+            help="To the origin"),
+    Command("Clear rotation", "Object/Clear", _clear("rotation"), "Alt+R", enabled=_selected, group=3,
+            help="Unturned"),
+    Command("Clear scale", "Object/Clear", _clear("scale"), "Alt+S", enabled=_selected, group=3,
+            help="At the mesh's own size"),
+    Command("Clear all three", "Object/Clear", objects.reset_transform, enabled=_selected, group=3,
+            help="Position 0, rotation 0, scale 1"),
+    Command("Frame selected", "View", camera.frame_selected, "KeypadDecimal, F",
             enabled=_has_objects, help="Look at what is selected, or at everything"),
     Command("Reset camera", "View", camera.reset_camera, "Home", help="The camera of the opened file"),
     Command("New camera", "View", camera.new_camera, help="Another camera with the view as it is"),
@@ -205,7 +242,8 @@ def command(name: str) -> Command:
 def help_lines(navigation: str) -> list[tuple[str, str]]:
     """(keys, what they do) for Help: the commands that have keys in that set, in the order of the menus."""
     lines = [
-        (one.keys_in(navigation), f"{one.name}: {one.help}" if one.help else one.name) for one in COMMANDS
+        (", ".join(one.printed_keys(navigation)), f"{one.name}: {one.help}" if one.help else one.name)
+        for one in COMMANDS
     ]
     return [(keys, text) for keys, text in lines if keys]
 

@@ -15,13 +15,14 @@ from pathlib import Path
 
 from incpt.core.errors import DeviceError, InputError, OutputError, one_line
 from incpt.picture import denoise
+from incpt.scene.edits import Copied
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
 from incpt.ui.display.overlays import NEEDS_FIRST_HITS
 from incpt.ui.editor.dialog import Answer, Dialog
 from incpt.ui.editor.document import Document
 from incpt.ui.editor.notices import Notices
-from incpt.ui.editor.state import Control, Gesture, Rendering, Screen, Tool
+from incpt.ui.editor.state import Beginning, Control, Gesture, Rendering, Screen, Tool
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
 from incpt.viewer.renderer import Exported, Message, Pick, Picked, Problem, Renderer, Restart
 from incpt.viewer.view import Frame, View
@@ -49,6 +50,7 @@ class Editor:
         self.renderer = open_renderer(device)
         self.document = document
         self.selection = Selection()
+        self.copied = Copied()
         self.preferences = preferences
         self.tool = Tool()
         self.control = Control(device=device)
@@ -123,17 +125,21 @@ class Editor:
         self._end_drag()
         self._restore_selection(self.document.history.redo())
 
-    def cancel(self) -> None:
-        """Escape: give up the drag under way, else the selection."""
-        if self.document.history.before is not None:
-            self._end_drag()
-            self.document.history.cancel()
-        elif self.selection:
-            self.select(Selection())
+    def cancel_drag(self) -> bool:
+        """Give up the drag under way; returns whether there was one."""
+        if self.document.history.before is None:
+            return False
+        self._end_drag()
+        self.document.history.cancel()
+        return True
 
     def select(self, selection: Selection) -> None:
         """Another selection; not an edit."""
         self.selection = selection.within(self.scene)
+
+    def begin(self, action: str, label: str) -> None:
+        """Begin something in the picture in this frame; see Beginning."""
+        self.gesture = replace(self.gesture, beginning=Beginning(action, label))
 
     def pick(self, pick: Pick) -> None:
         """Ask which object is at a point of the picture, to select it; an edit to come starts there."""
@@ -224,11 +230,12 @@ class Editor:
                     self.say(message.text, "error")
         return messages
 
-    def settle(self, is_held: bool, is_flying: bool = False) -> None:
-        """End a frame; `is_held` tells whether a widget, the gizmo or the camera is being dragged."""
+    def settle(self, is_held: bool, is_flying: bool = False, hint: str = "") -> None:
+        """End a frame; `is_held` tells whether a widget, the gizmo or the camera is being dragged, or a
+        transform is under way, `hint` what keys do then (see Gesture)."""
         if not is_held and self.now() >= self.gesture.rest_until:
             self.document.history.settle()
-        self.gesture = Gesture(is_held, is_flying, self.gesture.rest_until)
+        self.gesture = Gesture(is_held, is_flying, self.gesture.rest_until, hint=hint)
         self.selection = self.selection.within(self.scene)
         self.renderer.show(self.view)
 

@@ -59,12 +59,26 @@ class Rendering:
         return self
 
 
+TRANSFORM_KEY = "transform"
+"""The key in the history of a transform under way; what is made to be moved at once has it as well."""
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """What a command begins in the picture: move, rotate, scale or box; `label` is the name of the edit."""
+
+    action: str
+    label: str
+
+
 @dataclass(frozen=True)
 class Gesture:
     """What the user's hand is doing, from one frame to the next.
 
     is_held        a widget, the gizmo or the camera is being dragged.
     is_flying      the camera flies: frames are due without an event, and letters are no commands.
+    hint           what the keys do while a transform or a box has them, one line; empty while none has.
+    beginning      what a command of this frame begins in the picture.
     rest_until     the entry of the history stays open until then, in seconds of the editor's clock.
     is_cancelled   a drag was given up in this frame: whoever holds it lets go.
     """
@@ -73,6 +87,13 @@ class Gesture:
     is_flying: bool = False
     rest_until: float = 0.0
     is_cancelled: bool = False
+    hint: str = ""
+    beginning: Beginning | None = None
+
+    @property
+    def takes_keys(self) -> bool:
+        """Whether keys steer what is under way, and are no commands."""
+        return self.is_flying or bool(self.hint)
 
 
 @dataclass(frozen=True)

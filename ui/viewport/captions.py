@@ -28,6 +28,15 @@ def draw(frame: Frame | None, overlay: Overlay | None, settings: DisplaySettings
         _write_sides(canvas, frame, settings.split_position, area)
 
 
+def write_label(canvas: imgui.ImDrawList, at: Point, text: str) -> None:
+    """Write a line over the picture, on a dark ground; `at` is its top left, in points."""
+    size, pad = imgui.calc_text_size(text), imgui.get_text_line_height() * 0.3
+    dark = imgui.get_color_u32(imgui.ImVec4(0.0, 0.0, 0.0, 0.6))
+    corner, opposite = (at[0] - pad, at[1] - pad / 2), (at[0] + size.x + pad, at[1] + size.y + pad / 2)
+    canvas.add_rect_filled(corner, opposite, dark, 3.0)
+    canvas.add_text(at, imgui.get_color_u32(imgui.ImVec4(*theme.TEXT)), text)
+
+
 def _write_numbers(canvas: imgui.ImDrawList, overlay: Overlay, picture: Picture, area: Rect[float]) -> None:
     if overlay.numbers is None or overlay.numbers_at is None:
         return
@@ -47,7 +56,7 @@ def _write_legend(canvas: imgui.ImDrawList, overlay: Overlay, area: Rect[float])
     line = imgui.get_text_line_height()
     x, y = area.left + line * 0.6, area.bottom - line * 1.4
     for text, (red, green, blue) in overlay.legend:
-        _write_label(canvas, (x + line * 1.2, y), text)
+        write_label(canvas, (x + line * 1.2, y), text)
         tint = imgui.get_color_u32(imgui.ImVec4(red / 255, green / 255, blue / 255, 1.0))
         canvas.add_rect_filled((x, y), (x + line * 0.8, y + line), tint, 2.0)
         y -= line * 1.35
@@ -57,16 +66,8 @@ def _write_sides(canvas: imgui.ImDrawList, frame: Frame, position: float, area: 
     line = imgui.get_text_line_height()
     bar, y = split_x(area, position), area.top + line * 0.5
     left, right = (f"{p.strategy}, {p.seconds:.2f} s" + _error_text(p.error) for p in frame.pictures)
-    _write_label(canvas, (bar - imgui.calc_text_size(left).x - line, y), left)
-    _write_label(canvas, (bar + line, y), right)
-
-
-def _write_label(canvas: imgui.ImDrawList, at: Point, text: str) -> None:
-    size, pad = imgui.calc_text_size(text), imgui.get_text_line_height() * 0.3
-    dark = imgui.get_color_u32(imgui.ImVec4(0.0, 0.0, 0.0, 0.6))
-    corner, opposite = (at[0] - pad, at[1] - pad / 2), (at[0] + size.x + pad, at[1] + size.y + pad / 2)
-    canvas.add_rect_filled(corner, opposite, dark, 3.0)
-    canvas.add_text(at, imgui.get_color_u32(imgui.ImVec4(*theme.TEXT)), text)
+    write_label(canvas, (bar - imgui.calc_text_size(left).x - line, y), left)
+    write_label(canvas, (bar + line, y), right)
 
 
 def _error_text(error: float | None) -> str:

@@ -14,11 +14,12 @@ from incpt.scene.selection import Selection
 from incpt.ui import bindings
 from incpt.ui.bindings import Button, MouseAction
 from incpt.ui.display.projection import split_x
-from incpt.ui.editor.state import Tool
+from incpt.ui.editor.state import TRANSFORM_KEY, Beginning, Tool
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
 from incpt.ui.rect import Point, Rect
-from incpt.ui.viewport import light_marks
+from incpt.ui.viewport import light_marks, modal_input, modal_marks
 from incpt.ui.viewport.gizmo import Gizmo
+from incpt.ui.viewport.transform_mode import TransformMode
 from incpt.ui.widgets import places
 from incpt.viewer.renderer import Pick
 
@@ -83,6 +84,7 @@ class Viewport:
 
     def __init__(self) -> None:
         self.gizmo = Gizmo()
+        self._transform = TransformMode()
         self._held_by_gizmo: tuple[int, tuple[str, ...]] = (0, ())
         self._press: _Press | None = None
         self._holds_bar = False
@@ -103,24 +105,33 @@ class Viewport:
         picture: Rect[float],
         *,
         is_blocked: bool = False,
+        beginning: Beginning | None = None,
     ) -> Outcome:
         """Take the mouse and the keys of a frame. The picture lies at `picture`, in points. `is_blocked`
-        tells that a dialog is open, which takes them instead."""
+        tells that a dialog is open, which takes them instead; `beginning` is what a command begins here."""
         self._is_blocked = is_blocked
         places.note_rect("picture", picture)
         outcome = Outcome(scene, selection, preferences.display)
         if preferences.display.outline:
             light_marks.draw(scene, selection, picture)
-        outcome = self._use_gizmo(outcome, tool, preferences.snap, picture)
-        outcome = self._use_bar(outcome, picture)
-        outcome = self._use_mouse(outcome, preferences, picture)
-        return self._use_wheel(outcome, preferences.navigation, picture)
+        if beginning is not None:
+            self._begin(beginning, outcome, preferences.snap, picture)
+        if self._transform.is_on:
+            outcome = self._use_transform(outcome, preferences.snap, picture)
+        else:
+            outcome = self._use_gizmo(outcome, tool, preferences.snap, picture)
+            outcome = self._use_bar(outcome, picture)
+            outcome = self._use_mouse(outcome, preferences, picture)
+            outcome = self._use_wheel(outcome, preferences.navigation, picture)
+        modal_input.take_mouse(self._transform.is_on)
+        return outcome
 
     @property
     def is_held(self) -> bool:
-        """Whether the gizmo, the bar or the camera is being dragged."""
+        """Whether the gizmo, the bar or the camera is being dragged, or a transform is under way."""
         is_dragging = self._press is not None and self._press.is_drag
-        return self.gizmo.is_using or self._holds_bar or is_dragging or self._flies_freely
+        is_steered = self._transform.is_on or self._flies_freely
+        return self.gizmo.is_using or self._holds_bar or is_dragging or is_steered
 
     @property
     def is_flying(self) -> bool:
@@ -128,11 +139,30 @@ class Viewport:
         holds = self._press is not None and self._press.is_drag and self._press.action is MouseAction.FLY
         return self._flies_freely or holds
 
+    @property
+    def hint(self) -> str:
+        """What the keys do while something in the picture takes them, one line; empty: they are commands."""
+        return modal_marks.HINT if self._transform.is_on else ""
+
     def let_go(self) -> None:
         """Give up what is being dragged: nothing more happens until the button is released."""
         imgui.internal.clear_active_id()
         self.gizmo.give_up()
+        self._transform.stop()
         self._press = None
+
+    # ------------------------------------------------------------------- what commands begin here
+
+    def _begin(
+        self, beginning: Beginning, outcome: Outcome, snap: SnapSettings, picture: Rect[float]
+    ) -> None:
+        self.let_go()
+        self.gizmo.is_over = False
+        self._transform.begin(beginning, outcome.scene, outcome.selection.names, snap, picture)
+
+    def _use_transform(self, outcome: Outcome, snap: SnapSettings, picture: Rect[float]) -> Outcome:
+        scene = self._transform.update(outcome.scene, snap.enabled, picture, is_blocked=self._is_blocked)
+        return outcome.proposed(Proposal(scene, self._transform.label, TRANSFORM_KEY))
 
     # ----------------------------------------------------------------------------------- the gizmo
 

@@ -25,6 +25,13 @@ WARNING: Rgba = (0.98, 0.75, 0.25, 1.0)
 ERROR: Rgba = (1.00, 0.45, 0.40, 1.0)
 """The colour of what failed."""
 
+AXIS_COLORS: tuple[Rgba, Rgba, Rgba] = (
+    (0.90, 0.35, 0.38, 1.0),
+    (0.52, 0.78, 0.30, 1.0),
+    (0.35, 0.58, 0.95, 1.0),
+)
+"""The colours of x, y and z, as in the gizmo."""
+
 _COLORS: dict[str, Rgba] = {
     "text": TEXT,
     "text_disabled": (0.50, 0.50, 0.50, 1.0),

@@ -18,8 +18,6 @@ from incpt.ui.widgets import places, theme
 
 _AXES = ("X", "Y", "Z")
 """Names of the fields of a vector."""
-_AXIS_COLORS = ((0.90, 0.35, 0.38, 1.0), (0.52, 0.78, 0.30, 1.0), (0.35, 0.58, 0.95, 1.0))
-"""Colours of the marks beside those fields, as in the gizmo."""
 _LABEL_SHARE = 0.38
 """Width of a label, as a share of its row's."""
 _edited = [0]
@@ -241,7 +239,7 @@ def _axis_mark(axis: int, name: str) -> None:
     at, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height()
     width = max(2.0, height * 0.12)
     draw = imgui.get_window_draw_list()
-    tint = imgui.get_color_u32(imgui.ImVec4(*_AXIS_COLORS[axis]))
+    tint = imgui.get_color_u32(imgui.ImVec4(*theme.AXIS_COLORS[axis]))
     draw.add_rect_filled((at.x - width, at.y), (at.x, at.y + height), tint)
     size = imgui.calc_text_size(name)
     place = (at.x - 3.0 * width - size.x, at.y + (height - size.y) / 2)

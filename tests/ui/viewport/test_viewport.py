@@ -180,7 +180,7 @@ def test_the_gizmo_moves_in_steps(user: Desk) -> None:
 
 def test_the_gizmo_turns_and_scales(user: Desk) -> None:
     user.editor.select(Selection(("red cube",)))
-    user.run("Scale")
+    user.run("Scale handles")
     x, y = user.place("gizmo")
     user.drag_at((x, y), (60.0, 0.0))
     assert {p.split(".")[2] for p in changes(flat(SCENE), flat(user.scene))} == {"scale"}
@@ -206,10 +206,10 @@ def test_a_drag_of_the_gizmo_is_given_up(user: Desk, keys: str) -> None:
     assert user.scene != SCENE and user.undo_count == 1
 
 
-@pytest.mark.parametrize("keys", ["Shift+D", "Delete", "A", "H"])
+@pytest.mark.parametrize("keys", ["Ctrl+V", "Delete", "A", "H"])
 def test_an_edit_under_a_drag_of_the_gizmo_ends_it(user: Desk, keys: str) -> None:
     user.editor.select(Selection(("red cube",)))
-    user.frames(2)
+    user.run("Copy")
     x, y = user.place("gizmo")
     user.hold_at((x + 60, y), (60.0, 0.0))
     user.key(keys)
