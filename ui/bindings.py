@@ -30,6 +30,10 @@ class MouseAction(Enum):
     FLY = "fly"
     SELECT = "select"
     SELECT_MORE = "select more"
+    SELECT_OR_MENU = "select or menu"
+
+
+_CLICK_ACTIONS = (MouseAction.SELECT, MouseAction.SELECT_MORE, MouseAction.SELECT_OR_MENU)
 
 
 class Button(Enum):
@@ -57,7 +61,7 @@ class Binding:
         held = [name.capitalize() for name in (CTRL, ALT, SHIFT) if name in self.modifiers]
         gesture = {Button.WHEEL: "wheel", Button.GRAVE: "`"}.get(self.button)
         if gesture is None:
-            is_click = self.action in (MouseAction.SELECT, MouseAction.SELECT_MORE)
+            is_click = self.action in _CLICK_ACTIONS
             gesture = f"{self.button.value} {'click' if is_click else 'drag'}"
         text = " + ".join([*held, gesture])
         return text[0].upper() + text[1:]
@@ -70,8 +74,12 @@ def _binding(keys: str, action: MouseAction, description: str) -> Binding:
 
 CLICKS = (
     _binding("left", MouseAction.SELECT, "Select what is under the cursor; on nothing: deselect"),
-    _binding("right", MouseAction.SELECT, "The same"),
-    _binding("ctrl+left", MouseAction.SELECT_MORE, "Add it to the selection, or take it out"),
+    _binding("right", MouseAction.SELECT_OR_MENU, "The same; on what is selected: what can be done with it"),
+    _binding(
+        "shift+left", MouseAction.SELECT_MORE, "Add it to the selection; the last one added: take it out"
+    ),
+    _binding("shift+right", MouseAction.SELECT_MORE, "The same"),
+    _binding("ctrl+left", MouseAction.SELECT_MORE, "The same"),
     _binding("ctrl+right", MouseAction.SELECT_MORE, "The same"),
 )
 """What clicks do, in both sets."""
@@ -130,6 +138,24 @@ FLY_KEYS = (
 """The keys that fly, in both sets."""
 FLY_FAST = 4.0
 """How much faster the camera flies while Shift is held."""
+
+
+MODAL_LINES = (
+    ("X, Y, Z", "Along that axis of the world; again: along the object's own; again: freely"),
+    ("Shift + X, Y, Z", "In the plane across that axis; again: across the object's own"),
+    (
+        "0 to 9, + and -",
+        "By so much: metres, degrees or a factor; + begins the next number of a sum, - turns the sign",
+    ),
+    ("Tab", "Type the number of the next axis of a move"),
+    ("Backspace", "Take the last digit back; without one the mouse counts again"),
+    ("Ctrl", "In steps, those of Snap; freely, where Snap is on"),
+    ("Shift", "A tenth of the mouse's way, and of a step"),
+    ("G, R, S", "Move, rotate or scale instead"),
+    ("Enter, left click", "Done: one edit to undo"),
+    ("Esc, right click", "Give it up: all is as it was"),
+)
+"""(keys, what they do) while something is moved, turned or scaled by G, R or S, for Help, in both sets."""
 
 
 def action_for(navigation: str, button: Button, modifiers: Collection[str]) -> MouseAction | None:

@@ -12,6 +12,7 @@ from incpt.ui.rect import Rect
 from incpt.ui.viewport import captions
 from incpt.ui.viewport.viewport import Outcome, Viewport, picture_rect, pixels_in
 from incpt.ui.workspace import Workspace
+from incpt.viewer.renderer import PickBox
 
 
 def take_frame(
@@ -64,5 +65,9 @@ def _take_outcome(editor: Editor, outcome: Outcome) -> None:
     if outcome.selection != editor.selection:
         editor.select(outcome.selection)
     editor.change_display(outcome.display)
-    if outcome.pick is not None:
-        editor.pick(outcome.pick)
+    if isinstance(outcome.pick, PickBox):
+        editor.renderer.request(outcome.pick)
+    elif outcome.pick is not None:
+        editor.pick(outcome.pick, outcome.wants_menu)
+    elif outcome.wants_menu:
+        editor.open_menu("selection")

@@ -42,7 +42,8 @@ class Workspace:
         the picture, in points."""
         places.begin_frame()
         focus.begin_frame()
-        chosen = menus.draw_menu_bar(editor)
+        from_bar, from_popup = menus.draw_menu_bar(editor), menus.draw_popups(editor)
+        chosen = from_bar or from_popup
         if chosen is not None:
             editor.attempt(lambda: chosen(editor))
         status = notices.status_text(editor.frame, editor.control.paused, editor.selection)

@@ -37,10 +37,13 @@ class Selection:
         return self.names[-1] if self.names else None
 
     def clicked(self, name: str | None, additive: bool) -> Selection:
-        """After a click on an object, or on none. `additive` (Ctrl) adds or removes it and leaves the
-        others; a click on nothing deselects all unless it is additive."""
+        """After a click on an object, or on none. `additive` (Shift, Ctrl) makes it the active one beside the
+        others, or takes it out where it is that already, as in Blender; a click on nothing deselects all
+        unless it is additive."""
+        if additive and name is not None:
+            return self.toggled(name) if name == self.active else Selection((*self.names, name))
         if additive:
-            return self if name is None else self.toggled(name)
+            return self
         return Selection() if name is None else Selection((name,))
 
     def toggled(self, name: str) -> Selection:
@@ -48,6 +51,12 @@ class Selection:
         if name in self.names:
             return Selection(tuple(n for n in self.names if n != name))
         return Selection((*self.names, name))
+
+    def boxed(self, names: Sequence[str], takes_out: bool) -> Selection:
+        """With all of those names, the last of them active, or without them."""
+        if takes_out:
+            return Selection(tuple(name for name in self.names if name not in names))
+        return Selection((*self.names, *names)) if names else self
 
     def extended(self, name: str, order: Sequence[str]) -> Selection:
         """With everything between the active name and that one in a list, as by Shift."""

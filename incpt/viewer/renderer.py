@@ -21,6 +21,16 @@ class Pick:
 
 
 @dataclass(frozen=True)
+class PickBox:
+    """Which objects are seen in a box, whose corners `low` and `high` are in units of the image from the top
+    left? `takes_out` comes back as it is."""
+
+    low: tuple[float, float]
+    high: tuple[float, float]
+    takes_out: bool = False
+
+
+@dataclass(frozen=True)
 class Export:
     """Write the picture: .exr is linear radiance, `aovs` adds auxiliary images; .png is tone-mapped as
     `exposure` and `curve` say. `denoise`: .png is the denoised picture, which .exr has as a layer."""
@@ -44,7 +54,7 @@ class Restart:
     """Throw away what was accumulated."""
 
 
-Request = Pick | Export | Pin | Restart
+Request = Pick | PickBox | Export | Pin | Restart
 
 
 @dataclass(frozen=True)
@@ -65,6 +75,14 @@ class Picked:
 
 
 @dataclass(frozen=True)
+class PickedBox:
+    """The answer to a PickBox: the names of the objects, in the order of the scene."""
+
+    names: tuple[str, ...]
+    takes_out: bool
+
+
+@dataclass(frozen=True)
 class Exported:
     """The picture is in the file."""
 
@@ -79,7 +97,7 @@ class Problem:
     fatal: bool = False
 
 
-Message = Frame | Building | Picked | Exported | Problem
+Message = Frame | Building | Picked | PickedBox | Exported | Problem
 
 
 class Renderer(Protocol):

@@ -18,7 +18,19 @@ from incpt.core.errors import DeviceError, InputError, OutputError, one_line
 from incpt.device.device import Device
 from incpt.scene.model import Scene
 from incpt.viewer.denoising import DenoisingThread
-from incpt.viewer.renderer import Building, Export, Exported, Message, Pick, Picked, Pin, Problem, Request
+from incpt.viewer.renderer import (
+    Building,
+    Export,
+    Exported,
+    Message,
+    Pick,
+    PickBox,
+    Picked,
+    PickedBox,
+    Pin,
+    Problem,
+    Request,
+)
 from incpt.viewer.view import Frame, View
 from incpt.viewer.viewer import RenderingStoppedError, Viewer
 
@@ -176,6 +188,8 @@ class ThreadedRenderer:
         try:
             if isinstance(request, Pick):
                 self._post(Picked(request.point, viewer.pick(request.point), request.additive))
+            elif isinstance(request, PickBox):
+                self._post(PickedBox(viewer.pick_box(request.low, request.high), request.takes_out))
             elif isinstance(request, Export):
                 denoised = self._denoiser.denoised if request.denoise else None
                 viewer.export(request.path, request.aovs, request.exposure, request.curve, denoised)

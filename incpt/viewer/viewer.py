@@ -10,10 +10,13 @@ of the object follows soon; when it ends, the strategy starts anew with the NoR 
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from incpt.core.errors import DeviceError, InputError
 from incpt.device.device import Device
@@ -120,6 +123,17 @@ class Viewer:
         """The name of the object at a point (x, y) from the top left in units of the image, or None."""
         x, y = point
         return self.session.pick_point((x, y)) if 0 <= x < 1 and 0 <= y < 1 else None
+
+    def pick_box(self, low: tuple[float, float], high: tuple[float, float]) -> tuple[str, ...]:
+        """The names of the objects that are seen in a box, in the order of the scene; its corners (x, y) are
+        from the top left in units of the image."""
+        width, height = self.session.size
+        left, top = max(math.floor(low[0] * width), 0), max(math.floor(low[1] * height), 0)
+        right, bottom = min(math.ceil(high[0] * width), width), min(math.ceil(high[1] * height), height)
+        if left >= right or top >= bottom:
+            return ()
+        seen = self.session.first_hits(rows=(top, bottom)).object_id[:, left:right]
+        return tuple(self.session.scene.objects[i].name for i in np.unique(seen) if i >= 0)
 
     def restart(self) -> None:
         """Throw away what was accumulated; the picture stands until it is rendered anew."""

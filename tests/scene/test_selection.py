@@ -34,12 +34,20 @@ def test_a_click_selects_that_object_alone(selection: Selection, name: str) -> N
 
 
 @given(selections, names)
-def test_an_additive_click_toggles_and_keeps_the_others(selection: Selection, name: str) -> None:
+def test_an_additive_click_makes_active_and_keeps_the_others(selection: Selection, name: str) -> None:
     clicked = selection.clicked(name, additive=True)
-    assert (name in clicked) != (name in selection)
+    assert (name in clicked) == (name != selection.active)
     assert [n for n in clicked if n != name] == [n for n in selection if n != name]
     assert name not in clicked or clicked.active == name
     assert selection.clicked(None, additive=True) is selection
+
+
+@given(selections, st.lists(names, unique=True))
+def test_a_box_adds_or_takes_out_all_of_its_names(selection: Selection, chosen: list[str]) -> None:
+    added = selection.boxed(chosen, takes_out=False)
+    assert set(added) == {*selection, *chosen} and (not chosen or added.active == chosen[-1])
+    taken = selection.boxed(chosen, takes_out=True)
+    assert taken.names == tuple(name for name in selection if name not in chosen)
 
 
 @given(selections, names, names)

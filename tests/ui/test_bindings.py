@@ -51,9 +51,10 @@ def test_drags(
 
 
 def test_clicks_select_with_the_left_and_the_right_button() -> None:
-    for button in (Button.LEFT, Button.RIGHT):
-        assert bindings.click_action(button, ()) is MouseAction.SELECT
+    for button, action in ((Button.LEFT, MouseAction.SELECT), (Button.RIGHT, MouseAction.SELECT_OR_MENU)):
+        assert bindings.click_action(button, ()) is action
         assert bindings.click_action(button, {CTRL}) is MouseAction.SELECT_MORE
+        assert bindings.click_action(button, [SHIFT]) is MouseAction.SELECT_MORE
         assert bindings.click_action(button, {ALT}) is None
     assert bindings.click_action(Button.MIDDLE, ()) is None
 

@@ -22,7 +22,9 @@ from incpt.viewer.renderer import (
     Exported,
     Message,
     Pick,
+    PickBox,
     Picked,
+    PickedBox,
     Pin,
     Problem,
     Renderer,
@@ -93,6 +95,8 @@ def test_answers_requests(renderer: ThreadedRenderer, tmp_path: Path) -> None:
     assert wait_for(renderer, Picked) == Picked((0.5, 0.5), "red cube", True)
     renderer.request(Pick((0.0, 0.0)))
     assert wait_for(renderer, Picked) == Picked((0.0, 0.0), None, False)
+    renderer.request(PickBox((0.48, 0.48), (0.52, 0.52), takes_out=True))
+    assert wait_for(renderer, PickedBox) == PickedBox(("red cube",), True)
     renderer.request(Export(tmp_path / "a.exr", aovs=True))
     assert wait_for(renderer, Exported) == Exported(tmp_path / "a.exr")
     assert (tmp_path / "a.exr").stat().st_size > 1000

@@ -423,6 +423,14 @@ def test_picks_by_point(make_viewer: MakeViewer) -> None:
     assert viewer.pick((0.0, 0.0)) is None and viewer.pick((1.5, 0.5)) is None
 
 
+def test_picks_what_is_seen_in_a_box(make_viewer: MakeViewer) -> None:
+    viewer, _ = make_viewer(view_of(mixed_scene()))
+    assert viewer.pick_box((0.45, 0.45), (0.55, 0.55)) == ("red cube",)
+    assert viewer.pick_box((-1.0, -1.0), (2.0, 2.0)) == ("floor", "red cube", "glass ball", "grey drum")
+    assert viewer.pick_box((0.0, 0.0), (0.05, 0.05)) == ()
+    assert viewer.pick_box((1.2, 0.0), (1.4, 1.0)) == ()
+
+
 def test_export_writes_the_whole_picture_of_full_size(make_viewer: MakeViewer, tmp_path: Path) -> None:
     scene = mixed_scene()
     viewer, _ = make_viewer(view_of(scene))

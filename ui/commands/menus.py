@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 from itertools import groupby
 
@@ -10,7 +11,7 @@ from imgui_bundle import imgui
 
 from incpt.ui.commands import files
 from incpt.ui.commands.command import Action, Command
-from incpt.ui.commands.table import COMMANDS, MENUS
+from incpt.ui.commands.table import COMMANDS, MENUS, SELECTION_MENU, command
 from incpt.ui.editor.editor import Editor
 from incpt.ui.widgets import focus, places
 
@@ -42,6 +43,24 @@ def draw_menu_bar(editor: Editor) -> Action | None:
     return chosen
 
 
+def draw_popups(editor: Editor) -> Action | None:
+    """The menus that open at the mouse: what can be added, and what can be done with the selection; returns
+    what was chosen in one."""
+    if editor.screen.wanted_menu:
+        imgui.open_popup(editor.screen.wanted_menu)
+        editor.screen = replace(editor.screen, wanted_menu="")
+    chosen = None
+    for name, groups in _popups().items():
+        if not imgui.begin_popup(name):
+            continue
+        imgui.text_disabled(_popup_title(editor, name))
+        for commands in groups:
+            imgui.separator()
+            chosen = _draw_commands(editor, commands) or chosen
+        imgui.end_popup()
+    return chosen
+
+
 def pressed_command(editor: Editor) -> Command | None:
     """The command whose keys went down in this frame; none while a text is typed, a dialog is open, or what
     is under way in the picture takes the keys."""
@@ -49,6 +68,8 @@ def pressed_command(editor: Editor) -> Command | None:
         return None
     if imgui.is_key_pressed(imgui.Key.escape, False) and imgui.is_popup_open("", _ANY_POPUP):
         imgui.internal.close_popup_to_level(0, True)
+        return None
+    if any(map(imgui.is_popup_open, _popups())):
         return None
     navigation = editor.preferences.navigation
     for one in COMMANDS:
@@ -65,6 +86,22 @@ def key_chord(keys: str) -> int:
     for name in modifiers:
         chord |= int(_MODIFIERS[name])
     return chord
+
+
+@cache
+def _popups() -> dict[str, list[list[Command]]]:
+    """Groups of commands of the menus that open at the mouse, by name."""
+    return {
+        "add": [[one for one in COMMANDS if one.menu == "Object/Add"]],
+        "selection": [[command(name) for name in names] for names in SELECTION_MENU],
+    }
+
+
+def _popup_title(editor: Editor, name: str) -> str:
+    if name == "add":
+        return "Add"
+    names = editor.selection.names
+    return names[0] if len(names) == 1 else f"{len(names)} selected"
 
 
 def _draw_entries(editor: Editor, menu: str) -> Action | None:

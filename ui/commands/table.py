@@ -143,6 +143,8 @@ COMMANDS: tuple[Command, ...] = (
             help="Select every visible object and light"),
     Command("Select none", "Edit", objects.select_none, "Alt+A", plain_keys="Ctrl+Shift+A", group=1,
             help="Deselect"),
+    Command("Box select", "Edit", _begin("box", "Box select"), "B", enabled=_has_objects, group=1,
+            help="Select what is seen in a box that the mouse draws; Shift: add it, Ctrl: take it out"),
     Command("Cancel", "Edit", objects.cancel, "Escape", group=1,
             help="Give up a drag; in the plain set, without one: deselect"),
     Command("Copy", "Edit", objects.copy, "Ctrl+C", enabled=_selected, group=2,
@@ -160,6 +162,8 @@ COMMANDS: tuple[Command, ...] = (
             help="The handles move and rotate about the object's own axes"),
     Command("Snap", "Edit", _switch_snap, "Shift+Tab", plain_keys="X", group=4,
             checked=lambda e: e.preferences.snap.enabled, help="Move, rotate and scale in steps"),
+    Command("Add…", "Object", lambda e: e.open_menu("add"), "Shift+A",
+            help="What can be added, in a menu at the mouse"),
     *(Command(shape.capitalize(), "Object/Add", _add(shape), help=f"Add a {shape} where the camera looks")
       for shape in SHAPES),
     *(Command(name.capitalize(), "Object/Add", _add_light(kind), help=f"Add a {name} above what is looked at")
@@ -232,6 +236,14 @@ COMMANDS: tuple[Command, ...] = (
     Command("About incpt", "Help", _show_about, group=1),
 )  # fmt: skip
 """All commands, in the order of the menus. Their names are unique."""
+
+SELECTION_MENU: tuple[tuple[str, ...], ...] = (
+    ("Move", "Rotate", "Scale"),
+    ("Duplicate and move", "Copy", "Paste", "Delete", "Rename…"),
+    ("Hide", "Frame selected"),
+    ("Clear position", "Clear rotation", "Clear scale"),
+)
+"""What can be done with what is selected, by names of commands, in groups."""
 
 
 def command(name: str) -> Command:

@@ -60,6 +60,8 @@ def _draw_tables(command_lines: Sequence[Line], navigation: str) -> str:
     if imgui.begin_child("keys", imgui.ImVec2(0, height)):
         imgui.separator_text("In the picture")
         _draw_table("mouse", bindings.help_lines(navigation))
+        imgui.separator_text("While it is moved, rotated or scaled by keys")
+        _draw_table("modal", bindings.MODAL_LINES)
         imgui.separator_text("Commands")
         _draw_table("commands", command_lines)
     imgui.end_child()

@@ -24,7 +24,7 @@ from incpt.ui.editor.document import Document
 from incpt.ui.editor.notices import Notices
 from incpt.ui.editor.state import Beginning, Control, Gesture, Rendering, Screen, Tool
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
-from incpt.viewer.renderer import Exported, Message, Pick, Picked, Problem, Renderer, Restart
+from incpt.viewer.renderer import Exported, Message, Pick, Picked, PickedBox, Problem, Renderer, Restart
 from incpt.viewer.view import Frame, View
 
 OpenRenderer = Callable[[str | None], Renderer]
@@ -141,10 +141,16 @@ class Editor:
         """Begin something in the picture in this frame; see Beginning."""
         self.gesture = replace(self.gesture, beginning=Beginning(action, label))
 
-    def pick(self, pick: Pick) -> None:
-        """Ask which object is at a point of the picture, to select it; an edit to come starts there."""
+    def pick(self, pick: Pick, wants_menu: bool = False) -> None:
+        """Ask which object is at a point of the picture, to select it, or where `wants_menu` and it is
+        selected, to open its menu; an edit to come starts there."""
         self.control = replace(self.control, point=pick.point)
+        self.screen = replace(self.screen, menu_point=pick.point if wants_menu else None)
         self.renderer.request(pick)
+
+    def open_menu(self, name: str) -> None:
+        """Open a menu at the mouse in the next frame."""
+        self.screen = replace(self.screen, wanted_menu=name)
 
     def _end_drag(self) -> None:
         if self.document.history.before is not None:
@@ -223,12 +229,22 @@ class Editor:
             self.rendering = self.rendering.after(message)
             match message:
                 case Picked():
-                    self.select(self.selection.clicked(message.name, message.additive))
+                    self._take_pick(message)
+                case PickedBox():
+                    self.select(self.selection.boxed(message.names, message.takes_out))
                 case Exported():
                     self.say(f"{message.path} is written", "done")
                 case Problem():
                     self.say(message.text, "error")
         return messages
+
+    def _take_pick(self, picked: Picked) -> None:
+        is_for_menu = picked.point == self.screen.menu_point and picked.name in self.selection
+        self.screen = replace(self.screen, menu_point=None)
+        if is_for_menu:
+            self.open_menu("selection")
+        else:
+            self.select(self.selection.clicked(picked.name, picked.additive))
 
     def settle(self, is_held: bool, is_flying: bool = False, hint: str = "") -> None:
         """End a frame; `is_held` tells whether a widget, the gizmo or the camera is being dragged, or a

@@ -104,8 +104,12 @@ class Screen:
                          there is no room for one.
     is_closing           the window is to close.
     wants_first_layout   the panels are to stand again as at the first start.
+    wanted_menu          the menu that is to open at the mouse, by name; empty: none.
+    menu_point           where in the picture a menu was asked for, until it is known what is there.
     """
 
     viewport_size: tuple[int, int] | None = None
     is_closing: bool = False
     wants_first_layout: bool = False
+    wanted_menu: str = ""
+    menu_point: tuple[float, float] | None = None

@@ -54,6 +54,16 @@ def light_at(scene: Scene, point: Point, picture: Rect[float]) -> str | None:
     return found
 
 
+def lights_in(scene: Scene, box: Rect[float], picture: Rect[float]) -> tuple[str, ...]:
+    """The names of the lights whose icons are in a box of the screen, in points."""
+    found = []
+    for light in scene.lights:
+        at = place(scene.camera, light, picture) if light.visible else None
+        if at is not None and box.left <= at[0] <= box.right and box.top <= at[1] <= box.bottom:
+            found.append(light.name)
+    return tuple(found)
+
+
 def place(camera: Camera, light: Light, picture: Rect[float]) -> Point | None:
     """Where a light's icon is on the screen, in points; None behind the camera."""
     points = on_screen(camera, np.array([light.position]), picture)

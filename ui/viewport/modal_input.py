@@ -27,10 +27,15 @@ def mouse() -> Point:
 
 def ending() -> Ending | None:
     """Whether it ends in this frame: by Escape or the right button, or by Enter or the left one."""
-    if _is_pressed("escape") or imgui.is_mouse_clicked(imgui.MouseButton_.right):
+    if is_given_up():
         return Ending.GIVEN_UP
     is_entered = _is_pressed("enter") or _is_pressed("keypad_enter")
     return Ending.CONFIRMED if is_entered or imgui.is_mouse_clicked(imgui.MouseButton_.left) else None
+
+
+def is_given_up() -> bool:
+    """Whether Escape or the right button is pressed in this frame."""
+    return _is_pressed("escape") or imgui.is_mouse_clicked(imgui.MouseButton_.right)
 
 
 def transform_input(is_snapping: bool) -> Input:

@@ -17,11 +17,12 @@ from incpt.ui.display.projection import split_x
 from incpt.ui.editor.state import TRANSFORM_KEY, Beginning, Tool
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
 from incpt.ui.rect import Point, Rect
-from incpt.ui.viewport import light_marks, modal_input, modal_marks
+from incpt.ui.viewport import box_select, light_marks, modal_input, modal_marks
+from incpt.ui.viewport.box_select import BoxSelect
 from incpt.ui.viewport.gizmo import Gizmo
 from incpt.ui.viewport.transform_mode import TransformMode
 from incpt.ui.widgets import places
-from incpt.viewer.renderer import Pick
+from incpt.viewer.renderer import Pick, PickBox
 
 ZOOM_REST_SECONDS = 0.4
 """Turns of the wheel that are closer together than this are one entry of the history."""
@@ -50,14 +51,16 @@ class Outcome:
 
     scene, selection, display   the three after this frame.
     proposals                   the edits that led to `scene`, one after the other.
-    pick                        a click on the picture, to be asked of the renderer.
+    pick                        a click or a box on the picture, to be asked of the renderer.
+    wants_menu                  the click asks for the menu of what is selected, if it is on that.
     """
 
     scene: Scene
     selection: Selection
     display: DisplaySettings
     proposals: tuple[Proposal, ...] = ()
-    pick: Pick | None = None
+    pick: Pick | PickBox | None = None
+    wants_menu: bool = False
 
     def proposed(self, proposal: Proposal) -> Outcome:
         """After one more edit; one that leaves the scene as it is counts for nothing."""
@@ -85,6 +88,7 @@ class Viewport:
     def __init__(self) -> None:
         self.gizmo = Gizmo()
         self._transform = TransformMode()
+        self._box = BoxSelect()
         self._held_by_gizmo: tuple[int, tuple[str, ...]] = (0, ())
         self._press: _Press | None = None
         self._holds_bar = False
@@ -118,12 +122,14 @@ class Viewport:
             self._begin(beginning, outcome, preferences.snap, picture)
         if self._transform.is_on:
             outcome = self._use_transform(outcome, preferences.snap, picture)
+        elif self._box.is_on:
+            outcome = self._use_box(outcome, picture)
         else:
             outcome = self._use_gizmo(outcome, tool, preferences.snap, picture)
             outcome = self._use_bar(outcome, picture)
             outcome = self._use_mouse(outcome, preferences, picture)
             outcome = self._use_wheel(outcome, preferences.navigation, picture)
-        modal_input.take_mouse(self._transform.is_on)
+        modal_input.take_mouse(bool(self.hint))
         return outcome
 
     @property
@@ -142,6 +148,8 @@ class Viewport:
     @property
     def hint(self) -> str:
         """What the keys do while something in the picture takes them, one line; empty: they are commands."""
+        if self._box.is_on:
+            return box_select.HINT
         return modal_marks.HINT if self._transform.is_on else ""
 
     def let_go(self) -> None:
@@ -149,6 +157,7 @@ class Viewport:
         imgui.internal.clear_active_id()
         self.gizmo.give_up()
         self._transform.stop()
+        self._box.stop()
         self._press = None
 
     # ------------------------------------------------------------------- what commands begin here
@@ -158,11 +167,30 @@ class Viewport:
     ) -> None:
         self.let_go()
         self.gizmo.is_over = False
+        if beginning.action == "box":
+            self._box.begin()
+            return
         self._transform.begin(beginning, outcome.scene, outcome.selection.names, snap, picture)
 
     def _use_transform(self, outcome: Outcome, snap: SnapSettings, picture: Rect[float]) -> Outcome:
         scene = self._transform.update(outcome.scene, snap.enabled, picture, is_blocked=self._is_blocked)
         return outcome.proposed(Proposal(scene, self._transform.label, TRANSFORM_KEY))
+
+    def _use_box(self, outcome: Outcome, picture: Rect[float]) -> Outcome:
+        box = self._box.update(is_blocked=self._is_blocked)
+        if box is None:
+            return outcome
+        selection = outcome.selection if box.is_added or box.takes_out else Selection()
+        lights = light_marks.lights_in(outcome.scene, box.rect, picture) if outcome.display.outline else ()
+        low, high = (
+            picture.relative((box.rect.left, box.rect.top)),
+            picture.relative((box.rect.right, box.rect.bottom)),
+        )
+        return replace(
+            outcome,
+            selection=selection.boxed(lights, box.takes_out),
+            pick=PickBox(low, high, box.takes_out),
+        )
 
     # ----------------------------------------------------------------------------------- the gizmo
 
@@ -237,7 +265,7 @@ class Viewport:
         self._press = None
         if press.is_drag or press.click is None:
             return outcome
-        return _clicked(outcome, press.at, press.click is MouseAction.SELECT_MORE, picture)
+        return _clicked(outcome, press.at, press.click, picture)
 
     def _fly_freely(self, outcome: Outcome, speed: float, picture: Rect[float]) -> Outcome:
         mouse = _mouse()
@@ -294,12 +322,18 @@ def pixels_in(area: Rect[float]) -> tuple[int, int] | None:
     return (width, height) if min(width, height) >= _LEAST_PIXELS else None
 
 
-def _clicked(outcome: Outcome, at: Point, is_additive: bool, picture: Rect[float]) -> Outcome:
+def _clicked(outcome: Outcome, at: Point, action: MouseAction, picture: Rect[float]) -> Outcome:
+    is_additive = action is MouseAction.SELECT_MORE
+    outcome = replace(outcome, wants_menu=action is MouseAction.SELECT_OR_MENU)
     if picture.contains(at):
         light = light_marks.light_at(outcome.scene, at, picture) if outcome.display.outline else None
+        if light is not None and outcome.wants_menu and light in outcome.selection:
+            return outcome
         if light is not None:
+            outcome = replace(outcome, wants_menu=False)
             return replace(outcome, selection=outcome.selection.clicked(light, is_additive))
         return replace(outcome, pick=Pick(picture.relative(at), is_additive))
+    outcome = replace(outcome, wants_menu=False)
     return outcome if is_additive else replace(outcome, selection=Selection())
 
 

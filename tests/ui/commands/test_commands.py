@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.small_scenes import mixed_scene
 from support.ui_harness import Desk, changes, desk, flat, places, state
 
+from incpt.scene.material import Material
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
 from incpt.scene.shapes import SHAPES
+from incpt.scene.transform import Transform
 from incpt.ui import bindings
 from incpt.ui.bindings import Button, MouseAction
 from incpt.ui.commands import command as command_module
@@ -306,6 +310,48 @@ def test_duplicate_delete_show_and_reset(user: Desk) -> None:
     assert user.scene == MIXED and not user.editor.selection and user.undo_count == 4
     user.run("Undo")
     assert user.editor.selection.names == ("lamp.001", "red cube.001")
+
+
+def test_the_add_menu_opens_at_the_mouse(user: Desk) -> None:
+    at = user.at_picture(0.4, 0.4)
+    user.move(*at)
+    user.key("Shift+A")
+    user.frames(2)
+    assert user.shows("Cylinder") and user.shows("Sun")
+    assert np.abs(np.subtract(user.place("Cube"), at)).max() < 200
+    user.key("G")
+    user.click("Cylinder")
+    assert user.editor.selection.names == ("cylinder",) and user.undo_count == 1
+    assert not user.shows("Cylinder") and not user.editor.gesture.hint
+
+
+def test_what_is_copied_is_pasted_into_another_scene_too(user: Desk) -> None:
+    user.run("Point light")
+    user.editor.select(Selection(("point light", "red cube")))
+    user.key("Ctrl+C")
+    user.key("Ctrl+V")
+    assert user.editor.selection.names == ("point light.001", "red cube.001") and user.undo_count == 2
+    assert user.scene.materials == MIXED.materials, "the same materials"
+    other = new_scene()
+    user.editor.start_over(Document(replace(other, materials={**other.materials, "red": Material()})))
+    user.key("Ctrl+V")
+    assert user.editor.selection.names == ("point light", "red cube")
+    assert user.scene.object("red cube").material == "red.001", "it has a different one of that name"
+    assert user.scene.material("red.001") == MIXED.material("red")
+    user.key("Ctrl+V")
+    assert user.editor.selection.names == ("point light.001", "red cube.001")
+
+
+@pytest.mark.parametrize(("keys", "part"), [("Alt+G", "position"), ("Alt+R", "rotation"), ("Alt+S", "scale")])
+def test_one_part_of_each_transform_is_cleared(user: Desk, keys: str, part: str) -> None:
+    user.editor.select(Selection(("red cube", "grey drum", "floor")))
+    user.key(keys)
+    assert {place.split(".")[2] for place in changes(flat(MIXED), flat(user.scene))} == {part}
+    for name in user.editor.selection:
+        assert getattr(user.scene.object(name), part) == getattr(Transform(), part)
+    assert user.undo_count == 1
+    user.key(keys)
+    assert user.undo_count == 1, "there is nothing left to clear"
 
 
 def test_the_camera_is_framed_and_reset(user: Desk) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -10,12 +12,14 @@ import pytest
 from support.small_scenes import mixed_scene
 from support.ui_harness import Desk, changes, desk, flat, state, tell
 
+from incpt.scene.light import Light
 from incpt.scene.selection import Selection
 from incpt.ui.preferences import SnapSettings
 from incpt.ui.viewport.viewport import Outcome
-from incpt.viewer.renderer import Pick, Picked
+from incpt.viewer.renderer import Pick, PickBox, Picked, PickedBox
 
 SCENE = mixed_scene(size=(48, 32))
+LIT = SCENE.with_added_light(Light("spot", "spot", (-1.0, 1.2, 0.0)))
 
 
 @pytest.fixture
@@ -44,19 +48,99 @@ def test_a_click_picks_and_clicks_on_nothing_deselect(user: Desk) -> None:
     assert user.scene is SCENE and user.undo_count == 0
 
 
-def test_ctrl_picks_more_than_one(user: Desk) -> None:
+@pytest.mark.parametrize("key", ["Ctrl", "Shift"])
+def test_a_key_picks_more_than_one(user: Desk, key: str) -> None:
     user.editor.select(Selection(("lamp",)))
-    with user.held_keys("Ctrl"):
+    with user.held_keys(key):
         user.click_at(*user.at_picture(0.3, 0.1))
     assert isinstance(user.null.requests[-1], Pick) and user.null.requests[-1].additive
     tell(user, Picked((0.3, 0.1), "red cube", True))
     assert user.editor.selection.names == ("lamp", "red cube")
+    tell(user, Picked((0.3, 0.1), "lamp", True))
+    assert user.editor.selection.names == ("red cube", "lamp"), "it is the active one now"
     tell(user, Picked((0.3, 0.1), "lamp", True))
     assert user.editor.selection.names == ("red cube",)
     tell(user, Picked((0.3, 0.1), None, True))
     assert user.editor.selection.names == ("red cube",)
     tell(user, Picked((0.3, 0.1), None, False))
     assert user.editor.selection.names == ()
+
+
+def test_a_right_click_on_what_is_selected_opens_its_menu(user: Desk) -> None:
+    user.editor.select(Selection(("lamp", "red cube")))
+    x, y = map(math.floor, user.at_picture(0.5, 0.5))
+    where = float(x), float(y)
+    user.null.picks = {user.picture.relative(where): "grey drum"}
+    user.click_at(*where, 1)
+    assert user.editor.selection.names == ("grey drum",) and not user.shows("Rename…")
+    user.click_at(*where, 1)
+    user.frames(2)
+    assert user.editor.selection.names == ("grey drum",) and user.shows("Rename…")
+    user.key("X")
+    assert user.shows("Rename…"), "a key is no command below an open menu"
+    user.click("Delete")
+    assert "grey drum" not in user.scene.object_index and user.undo_count == 1
+    user.null.picks = {}
+    user.click_at(*where, 1)
+    user.frames(2)
+    assert not user.shows("Rename…")
+
+
+def test_a_light_has_its_menu_too(user: Desk) -> None:
+    user.editor.propose(LIT, "Light", selection=Selection(("spot",)))
+    user.frames(2)
+    user.click("light spot", 1)
+    user.frames(2)
+    assert user.shows("Rename…")
+    user.key("Escape")
+    assert not user.shows("Rename…") and user.editor.selection.names == ("spot",)
+    user.editor.select(Selection(("lamp",)))
+    user.click("light spot", 1)
+    user.frames(2)
+    assert not user.shows("Rename…") and user.editor.selection.names == ("spot",)
+
+
+@pytest.mark.parametrize(
+    ("key", "selected"),
+    [
+        ("", ("spot", "red cube", "lamp")),
+        ("Shift", ("grey drum", "spot", "red cube", "lamp")),
+        ("Ctrl", ("grey drum",)),
+    ],
+)
+def test_a_box_selects_what_is_seen_in_it(user: Desk, key: str, selected: tuple[str, ...]) -> None:
+    user.editor.propose(LIT, "Light")
+    user.editor.select(Selection(("grey drum",) if key != "Ctrl" else ("grey drum", "lamp", "spot")))
+    user.frames(2)
+    at = user.place("light spot")
+    user.key("B")
+    assert user.editor.gesture.hint
+    with user.held_keys(key) if key else nullcontext():
+        user.drag_at((at[0] - 30, at[1] - 20), (100.0, 150.0))
+    request = user.null.requests[-1]
+    assert isinstance(request, PickBox) and request.takes_out == (key == "Ctrl")
+    corner = user.picture.relative((at[0] - 30, at[1] - 20))
+    assert request.low == pytest.approx(corner, abs=2e-3)
+    assert request.high == pytest.approx(user.picture.relative((at[0] + 70, at[1] + 130)), abs=2e-3)
+    tell(user, PickedBox(("red cube", "lamp"), request.takes_out))
+    assert user.editor.selection.names == selected
+    assert not user.editor.gesture.hint and user.undo_count == 1
+
+
+@pytest.mark.parametrize("end", ["Escape", "right click"])
+def test_a_box_is_given_up(user: Desk, end: str) -> None:
+    user.editor.select(Selection(("grey drum",)))
+    user.key("B")
+    user.hold_at(user.at_picture(0.2, 0.2), (60.0, 60.0))
+    if end == "Escape":
+        user.key(end)
+    else:
+        user.press(1)
+        user.release(1)
+    user.release()
+    user.frames(2)
+    assert user.editor.selection.names == ("grey drum",) and not user.null.requests
+    assert not user.editor.gesture.hint and user.scene is SCENE
 
 
 def test_a_click_beside_the_picture_deselects(user: Desk) -> None:
