@@ -178,6 +178,67 @@ def test_the_gizmo_moves_the_object_and_the_exported_picture_shows_it_there(
     assert {"normal.X", "depth.Z", "object_id"} < set(channels) and any("albedo" in n for n in channels)
 
 
+def test_keys_move_what_is_selected_and_give_it_up(hand: Hand) -> None:
+    from incpt.ui.widgets import places
+
+    editor = hand.app.editor
+    opened, modes = editor.scene, set()
+    pick(hand, "red cube")
+    hand.key("g")
+    start = hand.in_picture(0.5, 0.5)
+    for step in range(4):
+        hand.move((start[0] + 12 * step, start[1]))
+        hand.pump(lambda: hand.app.shown_frame.view.scene == editor.scene, frames=0)
+        modes.add(hand.app.shown_frame.pictures[-1].mode)
+        assert step == 0 or hand.app.shown_frame.view.before is opened
+    assert Mode.BASE not in modes, "what was rendered is kept"
+    before = keep(hand, "6-moved-by-mouse")
+    hand.key("x")
+    hand.type("1+.5")
+    after = keep(hand, "6-moved-by-number")
+    y, x = np.nonzero(np.abs(after.astype(int) - before).max(axis=-1) > 60)
+    line = hand.in_picture(*projected(opened, CUBE))[1]
+    beside = x < hand.in_picture(0.1, 0)[0]
+    assert (np.abs(y[beside] - line) < 3).any(), "the axis reaches to the edge of the picture"
+    hand.key("Return")
+    assert editor.scene.object("red cube").position == (1.2, 0.5, 0.6)
+    assert editor.document.history.undo_label == "Move" and "gizmo" in places.names()
+    hand.pump(lambda: is_answered(hand) and editor.frame.pictures[-1].mode is Mode.REFINE)
+    moved = editor.scene
+
+    hand.key("r")
+    hand.move((start[0], start[1] + 30))
+    hand.move((start[0] - 40, start[1] + 30))
+    assert editor.scene != moved
+    hand.click(start, button=3)
+    assert editor.scene is moved and editor.selection.names == ("red cube",)
+    hand.key("ctrl+z")
+    assert editor.scene == opened and not editor.document.history.can_undo
+
+
+def test_a_box_and_the_menu_of_what_is_selected(hand: Hand) -> None:
+    from incpt.ui.widgets import places
+
+    editor = hand.app.editor
+    ball, drum = (hand.in_picture(*projected(editor.scene, place)) for place in ((1.5, 0.5, 0), (-2, 0.5, 0)))
+    hand.key("b")
+    hand.drag((ball[0] - 4, ball[1] - 4), (ball[0] + 4, ball[1] + 4))
+    hand.pump(lambda: editor.selection.names == ("blue ball",), timeout=20)
+    with hand.holding("shift"):
+        hand.click(drum)
+    hand.pump(lambda: editor.selection.names == ("blue ball", "grey drum"), timeout=20)
+    hand.click(drum, button=3)
+    hand.pump(lambda: "Rename…" in places.names(), timeout=20)
+    keep(hand, "5-menu")
+    hand.click("Duplicate and move")
+    hand.type("2")
+    hand.key("Return")
+    copies = [editor.scene.object(f"{name}.001").position for name in ("blue ball", "grey drum")]
+    assert copies == [(3.5, 0.5, 0.0), (0.0, 0.5, 0.0)]
+    hand.key("x")
+    assert editor.scene.names == {"table", "red cube", "blue ball", "grey drum"}
+
+
 def test_what_is_dragged_is_seen_at_once_and_leaves_no_ghost(hand: Hand) -> None:
     """In the first picture of each step of a drag under impact, and in the picture once the edit is found."""
     from incpt.ui.panels import notices
