@@ -151,7 +151,7 @@ MODAL_LINES = (
     ("Backspace", "Take the last digit back; without one the mouse counts again"),
     ("Ctrl", "In steps, those of Snap; freely, where Snap is on"),
     ("Shift", "A tenth of the mouse's way, and of a step"),
-    ("G, R, S", "Move, rotate or scale instead"),
+    ("G, R, S", "Move, rotate or scale instead; R while it rotates: a trackball"),
     ("Enter, left click", "Done: one edit to undo"),
     ("Esc, right click", "Give it up: all is as it was"),
 )

@@ -294,9 +294,16 @@ def _undo_redo(soak: Soak) -> None:
 
 
 def _pick(soak: Soak) -> None:
+    from incpt.ui.widgets import places
+
     button = soak.random.choice((1, 3))
     soak.hand.click(soak.hand.in_picture(soak.random.random() * 0.99, soak.random.random() * 0.99), button)
     soak.take_over(lambda old, new: old == new)
+    if button == 3:
+        # On what is selected it opens a menu, once the renderer has said what is there.
+        soak.hand.pump(lambda: soak.hand.app.editor.screen.menu_point is None, timeout=20)
+        if "Rename…" in places.names():
+            soak.hand.key("Escape")
 
 
 def _press_key(soak: Soak) -> None:

@@ -40,10 +40,15 @@ def moved(one: Placed, by: Numbers) -> Placed:
 
 def turned(one: Placed, axis: Numbers, degrees: float, pivot: Array) -> Placed:
     """Turned about an axis (world space, one long) through a point, right-handed."""
-    if degrees == 0:
+    return turned_by(one, turn_matrix(axis, degrees), pivot)
+
+
+def turned_by(one: Placed, turn: Array, pivot: Array) -> Placed:
+    """Turned by a (3, 3) rotation about a point."""
+    if (turn == np.eye(3)).all():
         return one
     matrix = np.eye(4)
-    matrix[:3, :3] = turn_matrix(axis, degrees)
+    matrix[:3, :3] = turn
     result = transformed(one, matrix, pivot)
     if result.transform.matrix is not None:
         return result

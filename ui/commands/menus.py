@@ -69,11 +69,12 @@ def pressed_command(editor: Editor) -> Command | None:
     if imgui.is_key_pressed(imgui.Key.escape, False) and imgui.is_popup_open("", _ANY_POPUP):
         imgui.internal.close_popup_to_level(0, True)
         return None
-    if any(map(imgui.is_popup_open, _popups())):
-        return None
     navigation = editor.preferences.navigation
     for one in COMMANDS:
         if any(imgui.is_key_chord_pressed(key_chord(keys)) for keys in one.keys_in(navigation)):
+            # A menu at the mouse shows keys, and one that is pressed takes the place of a click there.
+            if any(map(imgui.is_popup_open, _popups())):
+                imgui.internal.close_popup_to_level(0, True)
             return one
     return None
 

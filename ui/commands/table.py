@@ -174,8 +174,8 @@ COMMANDS: tuple[Command, ...] = (
                  "Digits, sums and minus: by so much. Ctrl: in steps. Shift: finer"),
     Command("Rotate", "Object/Transform", _begin("rotate", "Rotate"), "R", plain_keys="Shift+R",
             enabled=_shows_selected,
-            help="The mouse turns it, with the same keys; without an axis about the line of sight. "
-                 "R alone is for the handles in the plain set"),
+            help="The mouse turns it, with the same keys; without an axis about the line of sight, where a "
+                 "number is clockwise. In the plain set R alone is for the handles"),
     Command("Scale", "Object/Transform", _begin("scale", "Scale"), "S", enabled=_shows_selected,
             help="The mouse scales it, with the same keys"),
     Command("Duplicate", "Object", objects.duplicate, plain_keys="Ctrl+D", enabled=_selected,

@@ -28,7 +28,9 @@ from incpt.ui.viewport.typed_number import TypedNumber
 Array = npt.NDArray[np.float64]
 
 OPERATIONS: Mapping[str, str] = MappingProxyType({"g": "move", "r": "rotate", "s": "scale"})
-"""Operations, by the keys that change to them."""
+"""Operations, by the keys that change to them; while it rotates, R changes to the trackball."""
+_DEGREES_PER_POINT = math.degrees(0.01)
+"""How far a trackball turns for the mouse's way, as in Blender."""
 FINE = 0.1
 """What a move of the mouse counts for while Shift is held, and a step of snapping too."""
 _NEAREST_POINTS = 8.0
@@ -88,7 +90,7 @@ class Start:
 class ModalTransform:
     """A transform under way.
 
-    operation    move, rotate or scale.
+    operation    move, rotate, trackball or scale.
     constraint   along what; None: the view decides.
     typed        numbers by component, of which `component` is typed now; none while the mouse counts.
     began        where the mouse was when the operation began; `mouse` where it is.
@@ -135,17 +137,25 @@ class ModalTransform:
 
     def _after_key(self, key: str) -> ModalTransform:
         if key in OPERATIONS:
-            if OPERATIONS[key] == self.operation:
-                return self
-            return ModalTransform(self.start, OPERATIONS[key], self.mouse, self.mouse, self.constraint)
+            return self._after_operation(OPERATIONS[key])
         if key == "backspace":
             return self._with_number(self._number.erased())
         if key == "tab":
             return replace(self, component=(self.component + 1) % len(self.components))
+        if self.operation == "trackball":
+            return self._after_operation("rotate")._after_key(key)
         axis = AXES.index(key[-1].upper())
         constraint = axis_constraint.after_key(self.constraint, axis, key.startswith("shift+"))
         # Of several numbers, which belonged to other axes, the one that was typed last is kept.
         return replace(self, constraint=constraint, typed=(self._number,), component=0)
+
+    def _after_operation(self, wanted: str) -> ModalTransform:
+        """With another operation, which begins from the start where the mouse is now."""
+        if wanted == "rotate" == self.operation:
+            return ModalTransform(self.start, "trackball", self.mouse, self.mouse)
+        if wanted == self.operation:
+            return self
+        return ModalTransform(self.start, wanted, self.mouse, self.mouse, self.constraint)
 
     @property
     def _number(self) -> TypedNumber:
@@ -166,7 +176,9 @@ class ModalTransform:
     @property
     def components(self) -> tuple[int, ...]:
         """The axes of which numbers are typed one after the other; of a turn and a scaling there is one
-        number for all."""
+        number for all, of a trackball one about the camera's right and one about its up."""
+        if self.operation == "trackball":
+            return (0, 1)
         if self.operation != "move":
             return (0,)
         return self.constraint.free if self.constraint is not None else (0, 1, 2)
@@ -204,6 +216,17 @@ class ModalTransform:
         return self._in_steps(self.turned, self.start.snap.rotate_deg)
 
     @cached_property
+    def ball_angles(self) -> tuple[float, float]:
+        """Of a trackball, degrees: about the camera's right and about its up, so that what is in front goes
+        with the mouse."""
+        if self.is_typed:
+            first, second = (*self.typed, TypedNumber(), TypedNumber())[:2]
+            return first.value, second.value
+        dx, dy = self.way
+        step = self.start.snap.rotate_deg
+        return self._in_steps(_DEGREES_PER_POINT * dy, step), self._in_steps(_DEGREES_PER_POINT * dx, step)
+
+    @cached_property
     def factor(self) -> float:
         """Of a scaling: how much farther from the pivot the mouse is, negative on the other side of it."""
         if self.is_typed:
@@ -227,7 +250,9 @@ class ModalTransform:
     @cached_property
     def scene(self) -> Scene:
         """The scene now: that of the start itself where everything is as it was."""
-        act = {"move": self._moved, "rotate": self._turned, "scale": self._scaled}[self.operation]
+        act = {
+            "move": self._moved, "rotate": self._turned, "trackball": self._rolled, "scale": self._scaled,
+        }[self.operation]  # fmt: skip
         old = {name: self.start.scene.placed(name) for name in self.start.names}
         new = {name: act(name, one) for name, one in old.items()}
         changed = {name: one for name, one in new.items() if one.transform != old[name].transform}
@@ -246,6 +271,12 @@ class ModalTransform:
         follows_mouse = self.is_typed or axis @ eye > 0
         return placing.turned(one, axis, self.angle if follows_mouse else -self.angle, pivot)
 
+    def _rolled(self, _name: str, one: Placed) -> Placed:
+        right, up, _ = self.start.scene.camera.image_plane(1.0)
+        turn = placing.turn_matrix(up / np.linalg.norm(up), self.ball_angles[1])
+        turn = placing.turn_matrix(right / np.linalg.norm(right), self.ball_angles[0]) @ turn
+        return placing.turned_by(one, turn, self.start.pivot)
+
     def _scaled(self, name: str, one: Placed) -> Placed:
         factors = np.full(3, self.factor)
         if self.constraint is not None:
@@ -259,6 +290,9 @@ class ModalTransform:
             amounts = "  ".join(self._component_text(i) for i in range(len(self.components)))
             if self.constraint is None:
                 amounts += f"  ({np.linalg.norm(self.offset):.3f} m)"
+        elif self.operation == "trackball":
+            first, second = (self._amount_text(i, angle, ".2f") for i, angle in enumerate(self.ball_angles))
+            amounts = f"Trackball: {first}°  {second}°"
         elif self.operation == "rotate":
             amounts = f"Rotation: {self._amount_text(0, self.angle, '.2f')}°"
         else:

@@ -260,6 +260,24 @@ def test_typed_turns_are_right_handed_about_an_axis() -> None:
     assert placed(own, "lamp").rotation == pytest.approx((35.0, 20.0, 30.0))
 
 
+def test_a_trackball_turns_what_is_in_front_with_the_mouse() -> None:
+    front = np.array([0.0, 0.0, 1.0])
+    rolled = dragged(keys(start("rotate", "ball"), "r"), 50.0, 0.0)
+    turn = affine.rotation_matrix(placed(rolled, "ball").rotation)
+    assert rolled.operation == "trackball" and rolled.header == "Trackball: 0.00°  28.65°"
+    assert tuple(turn @ front) == pytest.approx((math.sin(0.5), 0.0, math.cos(0.5)))
+    down = dragged(keys(start("rotate", "ball"), "r"), 0.0, 30.0)
+    turn = affine.rotation_matrix(placed(down, "ball").rotation)
+    assert tuple(turn @ front) == pytest.approx((0.0, -math.sin(0.3), math.cos(0.3)))
+    both = typed(keys(typed(keys(start("rotate", "ball"), "r"), "90"), "tab"), "30")
+    # About y first, then about x.
+    expected = affine.rotation_matrix((90, 0, 0)) @ affine.rotation_matrix((0, 30, 0))
+    np.testing.assert_allclose(affine.rotation_matrix(placed(both, "ball").rotation), expected, atol=1e-9)
+    assert both.header == "Trackball: [90] = 90.00°  [30|] = 30.00°"
+    assert keys(rolled, "r").operation == "rotate" and keys(rolled, "r").scene is SCENE
+    assert keys(rolled, "y").header == "Rotation: 0.00°  along global Y"
+
+
 # ---------------------------------------------------------------------------------------------- scalings
 
 
@@ -325,7 +343,7 @@ def test_only_what_is_shown_is_transformed() -> None:
 def test_another_operation_begins_from_the_start() -> None:
     turned = keys(dragged(keys(start("move"), "x"), 100.0, 0.0), "r")
     assert turned.scene is SCENE and turned.operation == "rotate" and turned.constraint == AxisConstraint(0)
-    assert keys(turned, "r") is turned
+    assert keys(start("move"), "g").operation == "move"
 
 
 def test_a_pivot_behind_the_camera_is_moved_all_the_same() -> None:
@@ -363,17 +381,18 @@ class Model:
 
     def take(self, event: str) -> None:
         if event in "grs":
-            if event != self.operation[0].replace("m", "g"):
-                self.operation, self.text, self.sign = (
-                    {"g": "move", "r": "rotate", "s": "scale"}[event],
-                    "",
-                    1,
-                )
+            wanted = {"g": "move", "r": "rotate", "s": "scale"}[event]
+            if wanted == "rotate" == self.operation:
+                wanted, self.pressed = "trackball", []
+            if wanted != self.operation:
+                self.operation, self.text, self.sign = wanted, "", 1
         elif event == "backspace":
             self.text, self.sign = (self.text[:-1], self.sign) if self.text else ("", 1)
         elif event.startswith("text"):
             self.type(event[-1])
         else:
+            if self.operation == "trackball":
+                self.operation, self.text, self.sign = "rotate", "", 1
             pressed = "xyz".index(event[-1]), event.startswith("shift")
             again = pressed in self.pressed and len(self.pressed) < 3
             self.pressed = [*self.pressed, pressed] if again else [pressed]
@@ -406,6 +425,8 @@ class Model:
             linear, offset = np.eye(3), np.zeros(3)
             if self.operation == "move":
                 offset = amount * frame[:, free[0]]
+            elif self.operation == "trackball":
+                linear = placing.turn_matrix((1.0, 0.0, 0.0), amount)
             elif self.operation == "rotate":
                 about = frame[:, axis] if is_held else np.array([0.0, 0.0, -1.0])
                 linear = placing.turn_matrix(about, amount)
