@@ -102,13 +102,9 @@ def show_all(editor: Editor) -> None:
 
 def clear(editor: Editor, part: str) -> None:
     """The position, rotation or scale of the selected objects as that of a new one."""
-    changed = {}
-    for name in editor.selection.names:
-        one = editor.scene.placed(name)
-        if getattr(one, part) != getattr(IDENTITY, part):
-            changed[name] = replace(one, **{part: getattr(IDENTITY, part)})
-    if changed:
-        editor.propose(edits.with_all(editor.scene, changed), f"Clear {part}")
+    new = {part: getattr(IDENTITY, part)}
+    changed = {name: replace(editor.scene.placed(name), **new) for name in editor.selection.names}
+    editor.propose(edits.with_all(editor.scene, changed), f"Clear {part}")
 
 
 def reset_transform(editor: Editor) -> None:

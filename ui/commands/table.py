@@ -180,7 +180,7 @@ COMMANDS: tuple[Command, ...] = (
             help="The mouse scales it, with the same keys"),
     Command("Duplicate", "Object", objects.duplicate, plain_keys="Ctrl+D", enabled=_selected,
             group=1, help="Copy the selected objects, in their place"),
-    Command("Duplicate and move", "Object", objects.duplicate_and_move, "Shift+D", enabled=_shows_selected,
+    Command("Duplicate and move", "Object", objects.duplicate_and_move, "Shift+D", enabled=_selected,
             group=1, help="Copy the selected objects, and move the copies by the mouse"),
     Command("Delete", "Object", objects.delete, "X, Delete", plain_keys="Delete", enabled=_selected, group=1,
             help="Remove the selected objects"),

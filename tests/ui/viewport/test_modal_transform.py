@@ -351,6 +351,9 @@ def test_a_pivot_behind_the_camera_is_moved_all_the_same() -> None:
     for operation, pressed in itertools.product(("move", "rotate", "scale"), ((), ("x",), ("shift+y",))):
         moved = dragged(keys(start(operation, scene=scene), *pressed), 10.0, 10.0)
         assert np.isfinite(placed(moved).transform.world_from_object).all() and moved.scene is not scene
+    assert placed(dragged(start("move", scene=scene), 10.0, 0.0)).position[0] > 0, (
+        "the way that the mouse goes"
+    )
 
 
 def test_lines_stand_along_the_axes_before_the_camera() -> None:

@@ -160,6 +160,13 @@ def test_copies_are_moved_at_once_and_taken_back_at_once(user: Desk) -> None:
     assert user.undo_count == 1
 
 
+def test_copies_of_what_is_hidden_are_made_all_the_same(user: Desk) -> None:
+    user.run("Hide")
+    user.key("Shift+D")
+    assert user.editor.selection.names == ("red cube.001",) and not user.editor.gesture.hint
+    assert user.undo_count == 2
+
+
 def test_what_comes_from_elsewhere_ends_it(user: Desk) -> None:
     user.key("G")
     user.move(*user.at_picture(0.8, 0.4))

@@ -19,7 +19,7 @@ from incpt.ui.viewport.viewport import Outcome
 from incpt.viewer.renderer import Pick, PickBox, Picked, PickedBox
 
 SCENE = mixed_scene(size=(48, 32))
-LIT = SCENE.with_added_light(Light("spot", "spot", (-1.0, 1.2, 0.0)))
+LIT = SCENE.with_added_light(Light("spot", "spot", (-1.0, 1.2, 0.0)), Light("far", "point", (1.5, 1.2, 0.0)))
 
 
 @pytest.fixture
