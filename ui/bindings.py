@@ -9,7 +9,8 @@ drag and moves the camera, even with the button that selects. So no button has t
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import sys
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from enum import Enum
 
@@ -18,6 +19,20 @@ CLICK_PX = 4.0
 
 SHIFT, CTRL, ALT = "shift", "ctrl", "alt"
 """The modifier keys, as `Binding.modifiers` names them."""
+
+
+_PRINTED = {
+    CTRL: "Ctrl", SHIFT: "Shift", ALT: "Alt", "KeypadDecimal": "Numpad .", "Comma": ",", "Escape": "Esc",
+    **{f"Keypad{digit}": f"Numpad {digit}" for digit in range(10)},
+}  # fmt: skip
+"""What is printed on keys, by their names in the tables where these differ."""
+if sys.platform == "darwin":  # imgui takes the key of that place for Ctrl there.
+    _PRINTED |= {"Ctrl": "Cmd", "Alt": "Option", CTRL: "Cmd", ALT: "Option"}
+
+
+def printed(keys: Iterable[str]) -> str:
+    """Keys that are pressed together, as people read them on a keyboard: "Ctrl + Numpad 1"."""
+    return " + ".join(_PRINTED.get(key, key) for key in keys)
 
 
 class MouseAction(Enum):
@@ -58,12 +73,12 @@ class Binding:
     @property
     def keys(self) -> str:
         """What to do, as Help shows it: "Shift + middle drag"."""
-        held = [name.capitalize() for name in (CTRL, ALT, SHIFT) if name in self.modifiers]
+        held = [name for name in (CTRL, ALT, SHIFT) if name in self.modifiers]
         gesture = {Button.WHEEL: "wheel", Button.GRAVE: "`"}.get(self.button)
         if gesture is None:
             is_click = self.action in _CLICK_ACTIONS
             gesture = f"{self.button.value} {'click' if is_click else 'drag'}"
-        text = " + ".join([*held, gesture])
+        text = printed([*held, gesture])
         return text[0].upper() + text[1:]
 
 

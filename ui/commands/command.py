@@ -5,13 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from incpt.ui import bindings
 from incpt.ui.editor.editor import Editor
-
-_PRINTED = {
-    "KeypadDecimal": "Numpad .", "Comma": ",", "Escape": "Esc", "Grave_accent": "`",
-    **{f"Keypad{digit}": f"Numpad {digit}" for digit in range(10)},
-}  # fmt: skip
-"""What is printed on keys, where it is not their name in the table of commands."""
 
 Action = Callable[[Editor], object]
 """What a command does. What it refuses it raises; the editor shows it."""
@@ -43,9 +38,7 @@ class Command:
 
     def printed_keys(self, navigation: str) -> tuple[str, ...]:
         """The same as people read them on a keyboard: "Ctrl + Numpad 1"."""
-        return tuple(
-            " + ".join(_PRINTED.get(key, key) for key in keys.split("+")) for keys in self.keys_in(navigation)
-        )
+        return tuple(bindings.printed(keys.split("+")) for keys in self.keys_in(navigation))
 
     def is_enabled(self, editor: Editor) -> bool:
         return self.enabled is None or self.enabled(editor)

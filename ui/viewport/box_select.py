@@ -31,6 +31,7 @@ class BoxSelect:
     def __init__(self) -> None:
         self.is_on = False
         self._start: Point | None = None
+        self._last: Point = (0.0, 0.0)
 
     def begin(self) -> None:
         """Wait for a press."""
@@ -46,7 +47,7 @@ class BoxSelect:
         if is_blocked or is_given_up():
             self.stop()
             return None
-        at = mouse()
+        at = self._last = mouse(self._last)
         if self._start is None and imgui.is_mouse_clicked(_LEFT):
             self._start = at
         start = self._start

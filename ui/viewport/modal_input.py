@@ -19,10 +19,10 @@ class Ending(Enum):
     GIVEN_UP = "given up"
 
 
-def mouse() -> Point:
-    """Where the mouse is, in points."""
+def mouse(otherwise: Point) -> Point:
+    """Where the mouse is, in points; `otherwise` while it is outside of the window."""
     position = imgui.get_mouse_pos()
-    return position.x, position.y
+    return (position.x, position.y) if imgui.is_mouse_pos_valid() else otherwise
 
 
 def ending() -> Ending | None:
@@ -38,8 +38,9 @@ def is_given_up() -> bool:
     return _is_pressed("escape") or imgui.is_mouse_clicked(imgui.MouseButton_.right)
 
 
-def transform_input(is_snapping: bool) -> Input:
-    """A frame's input of a transform. `is_snapping` is what the preferences say, which Ctrl turns round."""
+def transform_input(last_mouse: Point, is_snapping: bool) -> Input:
+    """A frame's input of a transform. The mouse stays at `last_mouse` while it is outside of the window;
+    `is_snapping` is what the preferences say, which Ctrl turns round."""
     io = imgui.get_io()
     plane = "shift+" if io.key_shift else ""
     keys = [f"{plane}{key}" for key in _AXIS_KEYS if _is_pressed(key)]
@@ -47,7 +48,7 @@ def transform_input(is_snapping: bool) -> Input:
     keys += ["backspace"] if imgui.is_key_pressed(imgui.Key.backspace, True) else []
     keys += ["tab"] if _is_pressed("tab") else []
     text = "".join(map(chr, io.input_queue_characters))
-    return Input(mouse(), tuple(keys), text, io.key_shift, is_snapping != io.key_ctrl)
+    return Input(mouse(last_mouse), tuple(keys), text, io.key_shift, is_snapping != io.key_ctrl)
 
 
 def take_mouse(is_taken: bool) -> None:

@@ -34,7 +34,9 @@ class TransformMode:
     ) -> None:
         """Begin one of the named objects that are shown; the picture lies at `picture`, in points."""
         self.label, self._left = beginning.label, scene
-        self._now = modal_transform.begun(scene, names, beginning.action, modal_input.mouse(), snap, picture)
+        self._now = modal_transform.begun(
+            scene, names, beginning.action, modal_input.mouse(picture.middle), snap, picture
+        )
 
     def update(self, scene: Scene, is_snapping: bool, picture: Rect[float], *, is_blocked: bool) -> Scene:
         """Take a frame's mouse and keys and draw the marks; returns the scene after it. A scene that is not
@@ -47,7 +49,7 @@ class TransformMode:
         if ending is Ending.GIVEN_UP:
             self._now = None
             return now.start.scene
-        now = now.after(modal_input.transform_input(is_snapping))
+        now = now.after(modal_input.transform_input(now.mouse, is_snapping))
         self._now = None if ending is Ending.CONFIRMED else now
         if self._now is not None:
             modal_marks.draw(now, picture)

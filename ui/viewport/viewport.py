@@ -268,7 +268,7 @@ class Viewport:
         return _clicked(outcome, press.at, press.click, picture)
 
     def _fly_freely(self, outcome: Outcome, speed: float, picture: Rect[float]) -> Outcome:
-        mouse = _mouse()
+        mouse = modal_input.mouse(self._last_mouse)
         moved = _moved(outcome.scene.camera, MouseAction.FLY, self._last_mouse, mouse, picture.size)
         self._last_mouse = mouse
         is_clicked = any(map(imgui.is_mouse_clicked, range(3)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 from imgui_bundle import imgui
 from support.small_scenes import mixed_scene
@@ -16,6 +17,7 @@ from incpt.ui.preferences import NAVIGATIONS, SnapSettings
 
 SCENE = mixed_scene(size=(48, 32)).with_added_light(Light("spot", "spot", (-1.5, 2.0, 0.0)))
 CUBE = (0.0, 0.5, 0.0)
+FLT_MAX = float(np.finfo(np.float32).max)
 
 
 @pytest.fixture
@@ -165,6 +167,23 @@ def test_copies_of_what_is_hidden_are_made_all_the_same(user: Desk) -> None:
     user.key("Shift+D")
     assert user.editor.selection.names == ("red cube.001",) and not user.editor.gesture.hint
     assert user.undo_count == 2
+
+
+@pytest.mark.parametrize("keys", ["G", "R", "S", "B"])
+def test_a_mouse_that_leaves_the_window_stays_where_it_was(user: Desk, keys: str) -> None:
+    x, y = user.at_picture(0.6, 0.5)
+    user.key(keys)
+    user.move(x + 30, y + 20)
+    there = user.scene
+    user.move(-FLT_MAX, -FLT_MAX)  # what imgui is told then
+    user.frames(2)
+    assert user.scene is there
+    user.key("Escape")
+    user.key(keys)
+    user.frames(2)
+    assert user.scene == SCENE
+    user.move(x, y)
+    assert user.editor.gesture.hint
 
 
 def test_what_comes_from_elsewhere_ends_it(user: Desk) -> None:

@@ -19,6 +19,7 @@ from incpt.ui.viewport.viewport import Outcome
 from incpt.viewer.renderer import Pick, PickBox, Picked, PickedBox
 
 SCENE = mixed_scene(size=(48, 32))
+FLT_MAX = float(np.finfo(np.float32).max)
 LIT = SCENE.with_added_light(Light("spot", "spot", (-1.0, 1.2, 0.0)), Light("far", "point", (1.5, 1.2, 0.0)))
 
 
@@ -213,6 +214,17 @@ def test_a_camera_drag_is_given_up_by_escape(user: Desk) -> None:
     user.release(2)
     user.frames(2)
     assert user.scene == SCENE and user.undo_count == 0 and user.editor.selection.names == ("lamp",)
+
+
+def test_a_mouse_that_leaves_the_window_turns_no_camera_that_flies(user: Desk) -> None:
+    user.move(*user.at_picture(0.2, 0.2))
+    user.key("Shift+Grave_accent")
+    user.move(*user.at_picture(0.25, 0.2))
+    camera = user.scene.camera
+    assert camera != SCENE.camera
+    user.move(-FLT_MAX, -FLT_MAX)  # what imgui is told then
+    assert user.scene.camera == camera and user.editor.gesture.is_flying
+    user.key("Escape")
 
 
 def test_turns_of_the_wheel_are_one_entry_until_they_rest(user: Desk) -> None:
