@@ -11,11 +11,20 @@ from incpt.ui.editor.editor import Editor
 
 def frame_selected(editor: Editor) -> None:
     """Look at what is selected, or at everything."""
-    bounds = edits.bounds_of(editor.scene, editor.selection.names)
+    _frame(editor, editor.selection.names, "Frame selected")
+
+
+def frame_all(editor: Editor) -> None:
+    """Look at everything that is shown."""
+    _frame(editor, (), "Frame all")
+
+
+def _frame(editor: Editor, names: tuple[str, ...], label: str) -> None:
+    bounds = edits.bounds_of(editor.scene, names)
     if bounds is not None:
         width, height = editor.scene.settings.size
         camera = camera_moves.frame(editor.scene.camera, bounds, width / height)
-        editor.propose(replace(editor.scene, camera=camera), "Frame selected")
+        editor.propose(replace(editor.scene, camera=camera), label)
 
 
 def reset_camera(editor: Editor) -> None:

@@ -363,6 +363,11 @@ def test_the_camera_is_framed_and_reset(user: Desk) -> None:
     assert changes(flat(MIXED), flat(user.scene)) <= {
         f"camera.{what}.{i}" for what in ("position", "target") for i in range(3)
     }
+    closer = user.scene.camera
+    user.key("Home")
+    assert np.linalg.norm(
+        np.subtract(user.scene.camera.position, user.scene.camera.target)
+    ) > 2 * np.linalg.norm(np.subtract(closer.position, closer.target))
     user.run("Reset camera")
     assert user.scene == MIXED
 
