@@ -29,8 +29,9 @@ _DASH = 5.0
 """Length of a dash and of the gap behind it, in points."""
 
 
-def draw(transform: ModalTransform, picture: Rect[float]) -> None:
-    """Draw the marks over the picture, which lies at `picture` in points."""
+def draw(transform: ModalTransform, picture: Rect[float], is_split: bool) -> None:
+    """Draw the marks over the picture, which lies at `picture` in points. Where it `is_split`, the header
+    stands below the captions of the two sides."""
     canvas = imgui.get_background_draw_list()
     canvas.push_clip_rect((picture.left, picture.top), (picture.right, picture.bottom), True)
     camera = transform.start.scene.camera
@@ -42,7 +43,7 @@ def draw(transform: ModalTransform, picture: Rect[float]) -> None:
     if transform.operation != "move":
         _draw_dashes(canvas, transform.start.center, transform.mouse)
     canvas.pop_clip_rect()
-    _write_header(canvas, transform.header, picture)
+    _write_header(canvas, transform.header, picture, 2.2 if is_split else 0.5)
 
 
 def visible_part(camera: Camera, point: Array, direction: Array) -> Array:
@@ -61,9 +62,9 @@ def visible_part(camera: Camera, point: Array, direction: Array) -> Array:
     return np.array(ends)
 
 
-def _write_header(canvas: imgui.ImDrawList, text: str, picture: Rect[float]) -> None:
+def _write_header(canvas: imgui.ImDrawList, text: str, picture: Rect[float], lines: float) -> None:
     size, line = imgui.calc_text_size(text), imgui.get_text_line_height()
-    at = picture.left + (picture.width - size.x) / 2, picture.top + 0.5 * line
+    at = picture.left + (picture.width - size.x) / 2, picture.top + lines * line
     captions.write_label(canvas, at, text)
     places.note_rect("transform", Rect(at[0], at[1], size.x, size.y))
 

@@ -38,7 +38,15 @@ class TransformMode:
             scene, names, beginning.action, modal_input.mouse(picture.middle), snap, picture
         )
 
-    def update(self, scene: Scene, is_snapping: bool, picture: Rect[float], *, is_blocked: bool) -> Scene:
+    def update(
+        self,
+        scene: Scene,
+        is_snapping: bool,
+        picture: Rect[float],
+        *,
+        is_blocked: bool = False,
+        is_split: bool = False,
+    ) -> Scene:
         """Take a frame's mouse and keys and draw the marks; returns the scene after it. A scene that is not
         the one that it left ends it, because somebody else made that; a dialog (`is_blocked`) gives it up."""
         now = self._now
@@ -52,7 +60,7 @@ class TransformMode:
         now = now.after(modal_input.transform_input(now.mouse, is_snapping))
         self._now = None if ending is Ending.CONFIRMED else now
         if self._now is not None:
-            modal_marks.draw(now, picture)
+            modal_marks.draw(now, picture, is_split)
         self._left = now.scene
         return now.scene
 

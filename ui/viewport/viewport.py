@@ -173,7 +173,13 @@ class Viewport:
         self._transform.begin(beginning, outcome.scene, outcome.selection.names, snap, picture)
 
     def _use_transform(self, outcome: Outcome, snap: SnapSettings, picture: Rect[float]) -> Outcome:
-        scene = self._transform.update(outcome.scene, snap.enabled, picture, is_blocked=self._is_blocked)
+        scene = self._transform.update(
+            outcome.scene,
+            snap.enabled,
+            picture,
+            is_blocked=self._is_blocked,
+            is_split=outcome.display.split,
+        )
         return outcome.proposed(Proposal(scene, self._transform.label, TRANSFORM_KEY))
 
     def _use_box(self, outcome: Outcome, picture: Rect[float]) -> Outcome:

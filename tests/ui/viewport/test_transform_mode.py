@@ -50,6 +50,18 @@ def test_g_x_number_enter_moves_and_the_panel_agrees(user: Desk) -> None:
     assert user.scene == SCENE
 
 
+def test_the_header_stands_clear_of_the_captions_of_a_split_view(user: Desk) -> None:
+    user.key("G")
+    user.frames(2)
+    above = user.place("transform")[1]
+    user.key("Escape")
+    user.run("Split view")
+    user.key("G")
+    user.frames(2)
+    assert user.place("transform")[1] > above + imgui.get_font_size()
+    user.key("Escape")
+
+
 @pytest.mark.parametrize("end", ["click", "Enter", "KeypadEnter"])
 def test_the_picture_follows_the_mouse_until_the_end(user: Desk, end: str) -> None:
     x, y = user.at_picture(0.6, 0.5)
