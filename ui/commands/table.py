@@ -169,9 +169,8 @@ COMMANDS: tuple[Command, ...] = (
     *(Command(name.capitalize(), "Object/Add", _add_light(kind), help=f"Add a {name} above what is looked at")
       for kind, name in LIGHT_NAMES.items()),
     Command("Move", "Object/Transform", _begin("move", "Move"), "G", enabled=_shows_selected,
-            help="The mouse moves what is selected until a click or Enter; Esc or a right click gives it up. "
-                 "X, Y and Z: along an axis, pressed again along the object's own; with Shift in a plane. "
-                 "Digits, sums and minus: by so much. Ctrl: in steps. Shift: finer"),
+            help="The mouse moves what is selected until a click or Enter; Esc gives it up. X, Y, Z hold it "
+                 "along an axis, digits say by how much"),
     Command("Rotate", "Object/Transform", _begin("rotate", "Rotate"), "R", plain_keys="Shift+R",
             enabled=_shows_selected,
             help="The mouse turns it, with the same keys; without an axis about the line of sight, where a "
@@ -257,7 +256,7 @@ def command(name: str) -> Command:
 def help_lines(navigation: str) -> list[tuple[str, str]]:
     """(keys, what they do) for Help: the commands that have keys in that set, in the order of the menus."""
     lines = [
-        (", ".join(one.printed_keys(navigation)), f"{one.name}: {one.help}" if one.help else one.name)
+        (" or ".join(one.printed_keys(navigation)), f"{one.name}: {one.help}" if one.help else one.name)
         for one in COMMANDS
     ]
     return [(keys, text) for keys, text in lines if keys]

@@ -241,7 +241,7 @@ def test_help_lists_every_key_and_move(user: Desk, navigation: str, monkeypatch:
     for one in COMMANDS:
         if one.keys_in(navigation):
             what = f"{one.name}: {one.help}" if one.help else one.name
-            assert (", ".join(one.printed_keys(navigation)), what) in rows
+            assert (" or ".join(one.printed_keys(navigation)), what) in rows
     for line in bindings.help_lines(navigation):
         assert line in rows
 
