@@ -197,8 +197,8 @@ def _drag_gizmo(soak: Soak) -> None:
 def _transform_by_keys(soak: Soak) -> None:
     """G, R or S with an axis, by the mouse or a typed number, and kept or given up."""
     name = soak.select_one()
-    if name is None:
-        return
+    if name is None or not soak.model.scene.object(name).visible:
+        return  # there is nothing to move, and X deletes
     operation, axis = soak.random.choice("grs"), soak.random.choice("xyz")
     number, end = soak.random.choice(("", "0.5", "1+0.25", "-0.75")), soak.random.choice(("Return", "Escape"))
     soak.say(f"{operation} {axis} {number} {end}")
@@ -214,7 +214,7 @@ def _transform_by_keys(soak: Soak) -> None:
             raise SoakError("a transform that was given up leaves another scene")
         return
     soak.take_over(lambda old, new: _others(old, (name,)) == _others(new, (name,)))
-    if operation == "g" and number and model.scene.object(name).visible:
+    if operation == "g" and number:
         wanted = list(before.object(name).position)
         wanted["xyz".index(axis)] += {"0.5": 0.5, "1+0.25": 1.25, "-0.75": -0.75}[number]
         if model.scene.object(name).position != tuple(wanted):
