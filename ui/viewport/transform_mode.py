@@ -61,8 +61,10 @@ class TransformMode:
         self._now = None if ending is Ending.CONFIRMED else now
         if self._now is not None:
             modal_marks.draw(now, picture, is_split)
-        self._left = now.scene
-        return now.scene
+        # A scene that is equal, as of a mouse that moves while a number counts, is nothing new to anybody.
+        if now.scene != scene:
+            self._left = now.scene
+        return self._left
 
     def stop(self) -> None:
         """End it, whatever the scene is."""

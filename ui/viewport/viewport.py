@@ -188,15 +188,10 @@ class Viewport:
             return outcome
         selection = outcome.selection if box.is_added or box.takes_out else Selection()
         lights = light_marks.lights_in(outcome.scene, box.rect, picture) if outcome.display.outline else ()
-        low, high = (
-            picture.relative((box.rect.left, box.rect.top)),
-            picture.relative((box.rect.right, box.rect.bottom)),
-        )
-        return replace(
-            outcome,
-            selection=selection.boxed(lights, box.takes_out),
-            pick=PickBox(low, high, box.takes_out),
-        )
+        low = picture.relative((box.rect.left, box.rect.top))
+        high = picture.relative((box.rect.right, box.rect.bottom))
+        pick = PickBox(low, high, box.takes_out)
+        return replace(outcome, selection=selection.boxed(lights, box.takes_out), pick=pick)
 
     # ----------------------------------------------------------------------------------- the gizmo
 
@@ -329,18 +324,15 @@ def pixels_in(area: Rect[float]) -> tuple[int, int] | None:
 
 
 def _clicked(outcome: Outcome, at: Point, action: MouseAction, picture: Rect[float]) -> Outcome:
-    is_additive = action is MouseAction.SELECT_MORE
-    outcome = replace(outcome, wants_menu=action is MouseAction.SELECT_OR_MENU)
-    if picture.contains(at):
-        light = light_marks.light_at(outcome.scene, at, picture) if outcome.display.outline else None
-        if light is not None and outcome.wants_menu and light in outcome.selection:
-            return outcome
-        if light is not None:
-            outcome = replace(outcome, wants_menu=False)
-            return replace(outcome, selection=outcome.selection.clicked(light, is_additive))
-        return replace(outcome, pick=Pick(picture.relative(at), is_additive))
-    outcome = replace(outcome, wants_menu=False)
-    return outcome if is_additive else replace(outcome, selection=Selection())
+    is_additive, wants_menu = action is MouseAction.SELECT_MORE, action is MouseAction.SELECT_OR_MENU
+    if not picture.contains(at):
+        return outcome if is_additive else replace(outcome, selection=Selection())
+    light = light_marks.light_at(outcome.scene, at, picture) if outcome.display.outline else None
+    if light is None:
+        return replace(outcome, pick=Pick(picture.relative(at), is_additive), wants_menu=wants_menu)
+    if wants_menu and light in outcome.selection:
+        return replace(outcome, wants_menu=True)
+    return replace(outcome, selection=outcome.selection.clicked(light, is_additive))
 
 
 def _moved(

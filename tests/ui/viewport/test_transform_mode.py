@@ -39,6 +39,9 @@ def test_g_x_number_enter_moves_and_the_panel_agrees(user: Desk) -> None:
     user.write("1.5")
     assert position(user) == (1.5, 0.5, 0.0) and user.editor.view.before is SCENE
     assert user.shows("transform") and not user.shows("gizmo") and user.editor.gesture.hint
+    typed = user.scene
+    user.move(*user.at_picture(0.3, 0.3))
+    assert user.scene is typed, "the number counts, and the same scene is nothing new"
     user.key("Enter")
     assert position(user) == (1.5, 0.5, 0.0) and user.editor.view.before is None
     assert user.undo_count == 1 and user.editor.document.history.undo_label == "Move"
