@@ -126,7 +126,7 @@ class DisplaySettings(_Group):
 
 @dataclass(frozen=True)
 class SnapSettings(_Group):
-    """Steps of the gizmo while snapping: metres, degrees, and of the scale factor. Raises InputError."""
+    """Steps of moves, turns and scalings while snapping: metres, degrees, factor. Raises InputError."""
 
     enabled: bool = False
     move_m: float = 0.1

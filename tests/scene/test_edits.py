@@ -258,3 +258,17 @@ def test_cameras_are_added_and_renamed() -> None:
     for new in ("camera", ""):
         with pytest.raises(InputError):
             edits.rename_camera(renamed, "close", new)
+
+
+def test_what_is_copied_comes_with_its_materials() -> None:
+    copied = edits.copied(SCENE, ("cube", "floor"))
+    assert copied and set(copied.materials) == {"red", "blue"} and not edits.copied(SCENE, ())
+    scene, names = edits.paste(SCENE, copied)
+    assert names == ("cube.001", "floor.001") and scene.materials == SCENE.materials
+    assert replace(scene.object("cube.001"), name="cube") == SCENE.object("cube")
+    other = Scene(materials={"red": Material(metallic=1.0)})
+    scene, names = edits.paste(other, copied)
+    assert names == ("cube", "floor") and list(scene.materials) == ["red", "red.001", "blue"]
+    assert scene.object("cube").material == "red.001" and scene.object("floor").material == "blue"
+    with pytest.raises(InputError, match="nothing"):
+        edits.copied(SCENE, ("nothing",))
