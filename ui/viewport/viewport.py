@@ -119,8 +119,9 @@ class Viewport:
         if preferences.display.outline:
             light_marks.draw(scene, selection, picture)
         if beginning is not None:
+            # What it takes begins with the next frame: the key of this one is that of the command.
             self._begin(beginning, outcome, preferences.snap, picture)
-        if self._transform.is_on:
+        elif self._transform.is_on:
             outcome = self._use_transform(outcome, preferences.snap, picture)
         elif self._box.is_on:
             outcome = self._use_box(outcome, picture)

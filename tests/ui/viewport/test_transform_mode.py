@@ -6,10 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from imgui_bundle import imgui
 from support.small_scenes import mixed_scene
 from support.ui_harness import Desk, changes, desk, flat
 
+from incpt.scene import placing
 from incpt.scene.light import Light
 from incpt.scene.selection import Selection
 from incpt.ui.commands import files
@@ -123,6 +126,16 @@ def test_r_and_s_with_several_and_lights(user: Desk) -> None:
     user.write("2")
     user.key("Enter")
     assert user.scene.placed("red cube").scale == (2.0, 2.0, 2.0) and user.undo_count == 2
+
+
+def test_the_key_that_begins_it_is_no_input_of_it(user: Desk) -> None:
+    """A second R is for the trackball."""
+    user.key("R")
+    user.write("90")
+    user.key("Enter")
+    turn = placing.turn_matrix(SCENE.camera.image_plane(1.0)[2], 90)
+    expected = turn @ SCENE.object("red cube").world_from_object[:, :3]
+    np.testing.assert_allclose(user.scene.object("red cube").world_from_object[:, :3], expected, atol=1e-9)
 
 
 def test_keys_and_mouse_belong_to_it_meanwhile(user: Desk) -> None:
@@ -262,3 +275,57 @@ def test_the_tool_of_the_gizmo_stays(user: Desk) -> None:
     user.key("S")
     user.key("Escape")
     assert user.editor.tool == tool
+
+
+# Random gestures beside a list of scenes with a cursor, which is what undo has to be.
+
+GESTURES = st.one_of(
+    st.tuples(
+        st.sampled_from("GRS"),
+        st.sampled_from(("", "X", "YY", "ZZZ", "Shift+X")),
+        st.sampled_from(("", "2", "0.5+1", "1-")),
+        st.sampled_from(("Enter", "Escape", "click", "right click")),
+    ),
+    st.sampled_from(("Ctrl+Z", "Ctrl+Shift+Z")),
+)
+
+
+def work(user: Desk, operation: str, axes: str, text: str, end: str) -> None:
+    user.move(*user.at_picture(0.6, 0.5))
+    user.key(operation)
+    user.move(*user.at_picture(0.7, 0.4))
+    for axis in [axes] if "+" in axes else axes:
+        user.key(axis)
+    user.write(text)
+    if "click" in end:
+        user.press(1 if "right" in end else 0)
+        user.release(1 if "right" in end else 0)
+    else:
+        user.key(end)
+    user.frame()
+
+
+@settings(max_examples=12, deadline=None)
+@given(st.lists(GESTURES, min_size=1, max_size=6))
+def test_any_gestures_leave_the_history_that_a_list_has(gestures: list[tuple[str, ...] | str]) -> None:
+    scenes, cursor = [SCENE], 0
+    with desk(SCENE) as user:
+        user.editor.select(Selection(("red cube", "spot")))
+        for gesture in gestures:
+            before = user.scene
+            if isinstance(gesture, str):
+                user.key(gesture)
+                step = -1 if gesture == "Ctrl+Z" else 1
+                cursor = min(max(cursor + step, 0), len(scenes) - 1)
+            else:
+                work(user, *gesture)
+                if gesture[3] in ("Escape", "right click"):
+                    assert user.scene is before
+                elif user.scene != before:
+                    scenes[cursor + 1 :] = [user.scene]
+                    cursor += 1
+                places = changes(flat(before), flat(user.scene))
+                assert all(place.split(".")[1] in ("red cube", "spot") for place in places)
+                assert gesture[2] or gesture[3] in ("Escape", "right click") or places, "the mouse moved it"
+            assert user.scene == scenes[cursor] and not user.editor.gesture.hint
+            assert user.editor.selection.names == ("red cube", "spot")
