@@ -1,1 +1,1 @@
-"""The viewport: mouse and camera, the gizmo, and what is drawn over the picture."""
+"""The viewport: mouse and camera, the gizmo, transforms by keys, and what is drawn over the picture."""
