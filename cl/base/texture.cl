@@ -110,9 +110,13 @@ INLINE Texel sample_texture(const Shading *shading, uint number, const Uvs *uvs)
     return sample_image(shading, texture, place_in_image(texture, uvs));
 }
 
+typedef struct {
+    float u, v;
+} TextureSlope;
+
 // How red grows in a texture along u and along v: the differences over a pixel, which are continuous where
 // the slopes of what is interpolated are not.
-INLINE Uniform2 texture_slope(const Shading *shading, uint number, const Uvs *uvs) {
+INLINE TextureSlope texture_slope(const Shading *shading, uint number, const Uvs *uvs) {
     __global const Texture *texture = shading->textures + number;
     __global const float *m = texture->matrix;
     float width = (float)texture->width, height = (float)texture->height;
@@ -125,7 +129,7 @@ INLINE Uniform2 texture_slope(const Shading *shading, uint number, const Uvs *uv
                              sample_image(shading, texture, left).color.x);
     float along_y = height * (sample_image(shading, texture, below).color.x -
                               sample_image(shading, texture, above).color.x);
-    Uniform2 slope;
+    TextureSlope slope;
     slope.u = along_x * m[0] + along_y * m[3];
     slope.v = along_x * m[1] + along_y * m[4];
     return slope;

@@ -62,7 +62,7 @@ INLINE Vec3 height_gradient(__global const Object *objects, const Shading *shadi
     uint has = attributes->has_gradient;
     __global const float *g =
         shading->gradients + attributes->first_gradient + 6u * (size_t)(has * surface->face);
-    Uniform2 slope = texture_slope(shading, number, uvs);
+    TextureSlope slope = texture_slope(shading, number, uvs);
     float u = metres * slope.u, v = metres * slope.v;
     Vec3 grown = vec3(u * g[0] + v * g[3], u * g[1] + v * g[4], u * g[2] + v * g[5]);
     __global const float *m = objects[surface->object].object_from_world;
