@@ -48,6 +48,9 @@ def render(
     seed: SeedOption = None,
     strategy: Annotated[str | None, typer.Option(help=f"{' or '.join(STRATEGIES)}.")] = None,
     max_bounces: BouncesOption = None,
+    texture_limit: Annotated[
+        int | None, typer.Option(help="Halve images with more pixels a side, where memory is short.", min=0)
+    ] = None,
     camera: Annotated[
         str | None, typer.Option(help="A camera of the scene by its name, in place of the active one.")
     ] = None,
@@ -101,7 +104,14 @@ def render(
         scene = _scene(scene_file, moment, strict, allow_outside, is_first=session is None)
         scene = scene if camera is None else scene.with_active_camera(camera)
         if session is None:
-            settings = settings_from(scene, size=size, seed=seed, strategy=strategy, max_bounces=max_bounces)
+            settings = settings_from(
+                scene,
+                size=size,
+                seed=seed,
+                strategy=strategy,
+                max_bounces=max_bounces,
+                texture_limit=texture_limit,
+            )
             settings = replace(
                 settings, aovs=settings.aovs or aovs, transparent=settings.transparent or transparent
             )

@@ -45,6 +45,8 @@ class RenderSettings:
     point_of_change       "bounds" (centre of the object's 2D bounding box, old and new place) or
                           "pixel" (the pixel given with the edit: the thesis's choice).
     slots_per_step        tiles that fit one step; None: as many as the image has (the thesis).
+    texture_limit         the most pixels that images of textures have a side on the device: larger ones are
+                          halved until they fit; 0: all as they are.
     seed                  chooses the random numbers.
     aovs                  whether base colour and shading normal of what the samples meet first are passes of
                           the film, beside radiance: see `Session.pass_image`.
@@ -68,6 +70,7 @@ class RenderSettings:
     strategy: str = "impact"
     point_of_change: str = "bounds"
     slots_per_step: int | None = None
+    texture_limit: int = 0
     seed: int = 0
     aovs: bool = False
     transparent: bool = False
@@ -113,6 +116,7 @@ _RANGES: dict[str, tuple[int, int]] = {
     "base_nor": (1, 1 << 16),
     "sample_rate": (1, 4096),
     "slots_per_step": (1, 1 << 24),
+    "texture_limit": (0, 1 << 14),
     "seed": (0, (1 << 32) - 1),
 }
 
@@ -147,6 +151,7 @@ CUT_OFF_WORTH_TELLING = 1e-2
 PICTURE_SETTINGS = (
     *("max_bounces", "transmission_bounces", "roulette_depth", "multiple_scattering", "clamp_indirect"),
     "transparent",
+    "texture_limit",
     "seed",
 )
 """Settings that change what a sample is worth, so that what was accumulated cannot be kept."""

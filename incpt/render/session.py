@@ -126,6 +126,7 @@ class Session:
         require("settings", settings, (RenderSettings, NoneType), "RenderSettings")
         settings = scene.settings if settings is None else settings
         settings = settings if size is None else replace(settings, size=size)
+        scene = _limited(scene, settings)
         self.device = device if isinstance(device, Device) else Device(device)
         self._tracer = tracer_of(self.device)
         tables = tables_of(GeometryPool.of(self.device), scene)
@@ -230,6 +231,7 @@ class Session:
         require("since", since, (Scene, NoneType), "a Scene")
         pixel = _point(pixel)
         state = self._state if settings is None else self._configured(settings)
+        scene = _limited(scene, state.progress.settings)
         change = diff(self.scene, scene)
         progress = state.progress.after_edit(self.scene, scene, change, state.measured, since, pixel)
         self._state = self._brought(state, progress, scene)
@@ -489,7 +491,7 @@ class Session:
     def _configured(self, settings: RenderSettings) -> SessionState:
         """The state under other settings."""
         require("settings", settings, RenderSettings, "RenderSettings")
-        state, old = self._state, self.settings
+        state, old, scene = self._state, self.settings, _limited(self.scene, settings)
         # Memory that a step took beyond the settings goes back with settings that need less.
         keeps_memory = slots_of(settings) * settings.tile_size**2 >= slots_of(old) * old.tile_size**2
         path_buffer = PathBuffer.of_settings(
@@ -498,12 +500,10 @@ class Session:
         passes = passes_of(settings)
         if (old.size, old.tile_size, state.film.passes) != (settings.size, settings.tile_size, passes):
             film = _new_film(self.device, settings)
-            tables = tables_of(self._tables.pool, self.scene, self._tables)
-            return SessionState(
-                Progress.start(settings, self.scene, Measured(film)), film, path_buffer, tables
-            )
-        progress = state.progress.with_settings(settings, self.scene, state.measured)
-        return replace(self._brought(state, progress, self.scene), path_buffer=path_buffer)
+            tables = tables_of(self._tables.pool, scene, self._tables)
+            return SessionState(Progress.start(settings, scene, Measured(film)), film, path_buffer, tables)
+        progress = state.progress.with_settings(settings, scene, state.measured)
+        return replace(self._brought(state, progress, scene), path_buffer=path_buffer)
 
     def _batch(self, slots: npt.NDArray[np.void], path_buffer: PathBuffer) -> Batch:
         """All paths of these slots (layout.SLOT), in the scene as it is now."""
@@ -524,6 +524,13 @@ def _rows(rows: tuple[int, int], height: int) -> tuple[int, int]:
     if not 0 <= top < bottom <= height or top % 1 or bottom % 1:
         raise InputError(f"rows: {top:g} to {bottom:g} are no rows of {height}; name one at least")
     return int(top), int(bottom)
+
+
+def _limited(scene: Scene, settings: RenderSettings) -> Scene:
+    """The scene with the settings' limit of textures, which tables take from it."""
+    if scene.settings.texture_limit == settings.texture_limit:
+        return scene
+    return replace(scene, settings=replace(scene.settings, texture_limit=settings.texture_limit))
 
 
 def _new_film(device: Device, settings: RenderSettings) -> Film:

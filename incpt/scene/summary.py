@@ -82,7 +82,7 @@ def described_textures(scene: Scene) -> str:
         for slot in TextureSlot
         if (texture := texture_of(material, slot)) is not None
     }
-    size = sum(bitmap.device_bytes for bitmap in found) / 2**20
+    size = sum(bitmap.device_bytes(scene.settings.texture_limit) for bitmap in found) / 2**20
     images = f"{len(found):,} image{'s' if len(found) != 1 else ''}"
     return f"{images}, {size:.1f} MiB on a device" if found else "none"
 

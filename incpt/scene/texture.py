@@ -88,10 +88,11 @@ class Bitmap:
         """Pixels."""
         return int(self.pixels.shape[0])
 
-    @property
-    def device_bytes(self) -> int:
-        """What its pixels take on a device: whole numbers of 8 bits as they are, others as half floats."""
-        return int(self.pixels.size) * (1 if self.pixels.dtype == np.uint8 else 2)
+    def device_bytes(self, limit: int = 0) -> int:
+        """What its pixels take on a device where images have at most `limit` pixels a side (0: any number):
+        whole numbers of 8 bits as they are, others as half floats."""
+        width, height = fitted_size(self.width, self.height, whole("limit", limit, 0))
+        return width * height * self.channels * (1 if self.pixels.dtype == np.uint8 else 2)
 
     @property
     def channels(self) -> int:
@@ -102,6 +103,13 @@ class Bitmap:
     def has_alpha(self) -> bool:
         """Whether the last channel is alpha."""
         return self.channels in (2, 4)
+
+
+def fitted_size(width: int, height: int, limit: int) -> tuple[int, int]:
+    """The size of an image that is halved until it has at most `limit` pixels a side; 0: as it is."""
+    while limit and max(width, height) > limit:
+        width, height = -(-width // 2), -(-height // 2)
+    return width, height
 
 
 @dataclass(frozen=True)

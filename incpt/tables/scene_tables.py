@@ -234,7 +234,8 @@ def _make(pool: GeometryPool, scene: Scene, previous: SceneTables | None) -> Sce
     if previous is not None:
         previous = previous.unpaired or previous
     change = None if previous is None else diff(previous.scene, scene)
-    device = pool.device
+    device, limit = pool.device, scene.settings.texture_limit
+    has_other_limit = previous is not None and previous.scene.settings.texture_limit != limit
 
     # Bodies in contact depend on each other, and on what they are made of.
     may_grow = (
@@ -246,6 +247,8 @@ def _make(pool: GeometryPool, scene: Scene, previous: SceneTables | None) -> Sce
 
     def part(name: str, make: Callable[[], _Part]) -> _Part:
         if change is None or _REBUILT_BY[name](change) or (may_grow and name in _PLACED):
+            return make()
+        if has_other_limit and name in _OF_TEXTURES:
             return make()
         kept: _Part = getattr(previous, name)
         return kept
@@ -271,7 +274,7 @@ def _make(pool: GeometryPool, scene: Scene, previous: SceneTables | None) -> Sce
         "environment",
         lambda: environment_tables(device, scene.environment.picture, scene.environment.has_sun),
     )
-    textures = part("textures", lambda: texture_tables(device, scene.materials))
+    textures = part("textures", lambda: texture_tables(device, scene.materials, limit))
     attributes = part("attributes", lambda: attribute_table(pool, scene, meshes, textures.slots != 0))
     # Lights need the environment, and materials the densities of the lights; both need the textures.
     has_image_light = _has_image_light(scene, environment)
@@ -328,6 +331,8 @@ _REBUILT_BY: Mapping[str, Callable[[Change], bool]] = {
     "materials": _emission_changed,
 }
 """Which change makes which part of the tables anew."""
+_OF_TEXTURES = ("textures", "attributes", "lights", "materials")
+"""Parts that depend on how large textures are."""
 
 _PLACED = ("objects", "top_level")
 """The parts that depend on where objects are."""

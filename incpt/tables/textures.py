@@ -12,6 +12,7 @@ import numpy as np
 import pyopencl as cl
 
 from incpt.core import layout
+from incpt.core.errors import DeviceError
 from incpt.core.layout import TextureFlag, TextureSlot
 from incpt.device.device import Device
 from incpt.scene.material import Material, texture_of
@@ -91,8 +92,10 @@ class TextureTables:
     byte_count of the bitmaps on the device
     """
 
-    def __init__(self, device: Device, pool: TexturePool, materials: Iterable[Material]) -> None:
-        self.pool = pool
+    def __init__(
+        self, device: Device, pool: TexturePool, materials: Iterable[Material], limit: int = 0
+    ) -> None:
+        self.pool, self._limit = pool, limit
         self._device = device
         self.numbers: dict[tuple[Texture, bool], int] = {}
         self.slots = 0
@@ -106,7 +109,9 @@ class TextureTables:
                     wanted.append((texture, slot in _COLORS))
         for key in wanted:
             self.numbers.setdefault(key, len(self.numbers))
-        self._bitmaps = pool.hold((texture.bitmap, is_color) for texture, is_color in self.numbers)
+        self._bitmaps = pool.hold(
+            (self._fitted(texture, is_color), is_color) for texture, is_color in self.numbers
+        )
         self._buffer = self._uploaded()
 
     def has(self, slot: TextureSlot) -> bool:
@@ -134,30 +139,37 @@ class TextureTables:
         """The row that its emission is multiplied with."""
         return self.numbers_of(material)[TextureSlot.EMISSION]
 
+    def _fitted(self, texture: Texture, is_color: bool) -> Bitmap:
+        return texels.fitted(texture.bitmap, is_color, self._limit)
+
     def _uploaded(self) -> cl.Buffer:
         self._packings = self.pool.packings
         rows = np.zeros(len(self.numbers), layout.TEXTURE)
         for row, (texture, is_color) in zip(rows, self.numbers, strict=True):
-            _describe(row, texture, is_color, self._bitmaps[texture.bitmap, is_color].words.first)
+            _describe(row, texture, is_color, self._bitmaps[self._fitted(texture, is_color), is_color])
         return self._device.upload(rows)
 
 
-def _describe(row: np.void, texture: Texture, is_color: bool, first_word: int) -> None:
-    bitmap = texture.bitmap
+def _describe(row: np.void, texture: Texture, is_color: bool, pooled: _PooledBitmap) -> None:
+    bitmap = pooled.bitmap
     flags = texels.texture_flags(bitmap, is_color)
     if texture.filter == "nearest":
         flags |= TextureFlag.NEAREST
     for axis, how in zip("UV", texture.wrap, strict=True):
         if how != "repeat":
             flags |= TextureFlag[f"{how.upper()}_{axis}"]
-    row["first_word"], row["width"], row["height"] = first_word, bitmap.width, bitmap.height
+    row["first_word"], row["width"], row["height"] = pooled.words.first, bitmap.width, bitmap.height
     row["channels"], row["flags"], row["uv_set"] = bitmap.channels, flags, texture.uv_set
     row["matrix"] = texture.matrix.ravel()
 
 
-def texture_tables(device: Device, materials: Mapping[str, Material]) -> TextureTables:
-    """Those of these materials. Raises DeviceError where the device has no room for their bitmaps."""
-    return TextureTables(device, TexturePool.of(device), materials.values())
+def texture_tables(device: Device, materials: Mapping[str, Material], limit: int = 0) -> TextureTables:
+    """Those of these materials, with at most `limit` pixels a side (0: as they are). Raises DeviceError where
+    the device has no room for their bitmaps."""
+    try:
+        return TextureTables(device, TexturePool.of(device), materials.values(), limit)
+    except DeviceError as error:
+        raise DeviceError(f"textures: {error}; or halve large ones by texture_limit in [render]") from None
 
 
 _POOLS: WeakValueDictionary[Device, TexturePool] = WeakValueDictionary()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from incpt.picture import denoise
 from incpt.ui.preferences import DisplaySettings
 from incpt.ui.widgets import widgets
@@ -35,9 +37,8 @@ def draw(display: DisplaySettings, refusals: Refusals) -> DisplaySettings:
         "Exposure", display.exposure, low=-10.0, high=10.0, speed=0.02, unit=" EV", decimals=2
     )
     curve = widgets.choice("Curve", display.curve, list(CURVE_TEXTS.items()), "Tone mapping")
-    denoised = display.denoise
-    if denoise.is_available():
-        denoised = widgets.checkbox("Denoise", denoised, _DENOISE_TIP)
+    denoised = widgets.checkbox("Denoise", display.denoise and denoise.is_available(), _DENOISE_TIP)
+    display = refusals.accepted(display, lambda: _with_denoiser(display, denoised))
     overlay = widgets.choice("Overlay", display.overlay, list(OVERLAY_TEXTS.items()), "Laid over the picture")
     opacity = display.overlay_opacity
     if overlay != "none":
@@ -49,10 +50,16 @@ def draw(display: DisplaySettings, refusals: Refusals) -> DisplaySettings:
         display,
         exposure=exposure,
         curve=curve,
-        denoise=denoised,
         overlay=overlay,
         overlay_opacity=opacity,
         tile_grid=grid,
         outline=outline,
         split=split,
     )
+
+
+def _with_denoiser(display: DisplaySettings, is_on: bool) -> DisplaySettings:
+    """Raises InputError where there is none to be switched on."""
+    if is_on:
+        denoise.require_denoiser()
+    return display if is_on == display.denoise else replace(display, denoise=is_on)

@@ -41,6 +41,7 @@ _CLAMP_TIP = (
     "Against fireflies: the most that a sample adds at once after its first bounce; 0: all. Biased: it makes "
     "the picture darker than it should be"
 )
+_LIMIT_TIP = "Images with more pixels a side are halved on the device; 0: none is"
 _TRANSPARENT_TIP = (
     "The environment lights the scene, but is not seen behind it: the picture gets an alpha for what it is "
     "laid over"
@@ -158,6 +159,7 @@ def draw_settings(settings: RenderSettings, refusals: Refusals) -> RenderSetting
         ("sample_rate", "Sample rate", 1, 64, "Paths per pixel and slot"),
         ("max_bounces", "Bounces", 0, 200, "Scattering events after the first hit; 0: direct light only"),
         ("transmission_bounces", "Glass bounces", 0, 200, "Passages through smooth dielectrics"),
+        ("texture_limit", "Texture limit", 0, 1 << 14, _LIMIT_TIP),
         ("seed", "Seed", 0, (1 << 31) - 1, "Chooses the random numbers"),
     ):
         value = widgets.whole_number(

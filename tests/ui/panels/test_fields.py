@@ -14,6 +14,7 @@ from support.ui_harness import Desk, changes, desk, places, state
 
 from incpt.core.layout import TextureSlot
 from incpt.formats import bitmaps
+from incpt.picture import denoise
 from incpt.picture.color import linear_from_srgb
 from incpt.scene.material import Material
 from incpt.scene.model import Scene
@@ -141,6 +142,7 @@ FIELDS = [
     Field("Render", "Bounces", "scene.settings.max_bounces", "9", 9, dragged=60),
     Field("Render", "Glass bounces", "scene.settings.transmission_bounces", "3", 3, dragged=60),
     Field("Render", "Clamp indirect", "scene.settings.clamp_indirect", "2.5", 2.5),
+    Field("Render", "Texture limit", "scene.settings.texture_limit", "2048", 2048, dragged=60),
     Field("Render", "Seed", "scene.settings.seed", "12345", 12345, dragged=60),
     Field("Render", "Width", "scene.settings.size.0", "100", 100, dragged=60),
     Field("Render", "Height", "scene.settings.size.1", "70", 70, dragged=60),
@@ -174,6 +176,7 @@ CHECKBOXES = [
     ("Object", "Snap", "preferences.snap.enabled"),
     ("Render", "NoR adapts", "scene.settings.nor_adapts"),
     ("Render", "Transparent", "scene.settings.transparent"),
+    ("Method", "Denoise", "preferences.display.denoise"),
     ("Method", "Tile grid", "preferences.display.tile_grid"),
     ("Method", "Outline", "preferences.display.outline"),
     ("Method", "Split view", "preferences.display.split"),
@@ -231,7 +234,8 @@ def test_every_parameter_of_a_material_has_a_row() -> None:
 
 
 @pytest.fixture
-def user(request: pytest.FixtureRequest) -> Iterator[Desk]:
+def user(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
+    monkeypatch.setattr(denoise, "is_available", lambda: True)
     field = getattr(request.node, "callspec", None) and request.node.callspec.params.get("field")
     with desk(getattr(field, "scene", None) or SCENE, PREFERENCES) as made:
         made.editor.select(Selection(("red cube",)))
@@ -767,3 +771,11 @@ def test_a_sky_takes_the_place_of_an_image(user: Desk) -> None:
     assert changes(before, state(user.editor)) == {"scene.environment.sky.sun_disc"}
     user.click("Sky")
     assert user.scene.environment.sky is None and not user.shows("Sun elevation")
+
+
+def test_without_a_denoiser_a_line_says_how_to_get_one(user: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(denoise, "is_available", lambda: False)
+    turn_to(user, "Method")
+    user.click("Denoise")
+    assert not user.editor.preferences.display.denoise
+    assert 'pip install "incpt[denoise]"' in user.editor.notices.said[-1].text
