@@ -133,7 +133,13 @@ def _call_of(name: str, session: incpt.Session) -> Callable[..., Any]:
     owner, dot, method = name.partition(".")
     if not dot:
         return getattr(incpt, name)  # type: ignore[no-any-return]
-    instances = {"Camera": SCENE.camera, "Scene": SCENE, "Session": session, "Transform": incpt.Transform()}
+    instances = {
+        "Bitmap": incpt.Bitmap(np.ones((2, 4, 3))),
+        "Camera": SCENE.camera,
+        "Scene": SCENE,
+        "Session": session,
+        "Transform": incpt.Transform(),
+    }
     return getattr(instances.get(owner, getattr(incpt, owner)), method)  # type: ignore[no-any-return]
 
 
