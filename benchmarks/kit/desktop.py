@@ -169,7 +169,8 @@ class Hand:
         _xdotool("keydown", codes)
         time.sleep(_KEY_SECONDS)
         self.pump(frames=2)
-        _xdotool("keyup", codes)
+        # The modifiers last: a key that repeats because frames take long must not become a letter.
+        _xdotool("keyup", "+".join(reversed(codes.split("+"))))
         self.pump(frames=3)
 
     @contextmanager
