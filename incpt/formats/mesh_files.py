@@ -100,22 +100,21 @@ def _known(path: Path) -> _Known | None:
     """What was read of a file before, if it and the files beside it are unchanged. Raises InputError where
     the file cannot be read."""
     check_readable(path)
-    known = _files.get(_key(path))
-    return known if known is not None and known.is_unchanged() else None
+    key = _key(path)
+    known = _files.get(key)
+    if known is None or known.is_unchanged():
+        return known
+    del _files[key]
+    for part in known.file.parts:
+        _placed.pop((key, part.name), None)
+    return None
 
 
 def load_parts(path: str | os.PathLike[str]) -> tuple[MeshPart, ...]:
     """All meshes of a file as its nodes place them: baked into the vertices, winding turned where the
     placement mirrors. See `load_file`. Raises InputError."""
     path = path_of("path", path)
-    known = _known(path)
-    if known is not None:
-        found = [_placed.get((_key(path), part.name)) for part in known.file.parts]
-        kept = [replace(p, mesh=m) for p, m in zip(known.file.parts, found, strict=True) if m is not None]
-        if len(kept) == len(found):
-            import_report.tell(*known.remarks)
-            return tuple(replace(part, transform=IDENTITY) for part in kept)
-    return tuple(_with_placement(path, part) for part in load_file(path).parts)
+    return tuple(placed_part(path, part) for part in load_file(path).parts)
 
 
 def load_mesh(path: str | os.PathLike[str], part: str | None = None) -> Mesh:
@@ -123,11 +122,17 @@ def load_mesh(path: str | os.PathLike[str], part: str | None = None) -> Mesh:
     file holds several meshes and `part` is not given."""
     path = path_of("path", path)
     require("part", part, (str, NoneType), "the name of a part")
-    return choose_part(path, load_parts(path), part).mesh
+    known = _known(path)
+    if known is not None:
+        mesh = _placed.get((_key(path), choose_part(path, known.file.parts, part).name))
+        if mesh is not None:
+            import_report.tell(*known.remarks)
+            return mesh
+    return placed_part(path, choose_part(path, load_file(path).parts, part)).mesh
 
 
-def _with_placement(path: Path, part: MeshPart) -> MeshPart:
-    """The part with its placement in the vertices, the same mesh as long as that is in use."""
+def placed_part(path: Path, part: MeshPart) -> MeshPart:
+    """A part of that file with its placement in the vertices: the same mesh as long as that is in use."""
     key = (_key(path), part.name)
     mesh = part.mesh if part.transform == IDENTITY else _placed.get(key)
     if mesh is None:

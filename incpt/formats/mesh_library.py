@@ -10,7 +10,7 @@ from incpt.core.errors import InputError, in_place
 from incpt.formats import mesh_files
 from incpt.formats.toml_kit import text_of
 from incpt.scene.mesh import Mesh
-from incpt.scene.mesh_part import MeshFile, MeshPart
+from incpt.scene.mesh_part import MeshFile
 from incpt.scene.shapes import shape
 
 
@@ -19,7 +19,6 @@ class MeshLibrary:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._parts: dict[str, tuple[MeshPart, ...]] = {}
         self._files: dict[str, MeshFile] = {}
 
     def meshes(self, table: Mapping[str, Any]) -> list[tuple[str | None, Mesh]]:
@@ -36,16 +35,15 @@ class MeshLibrary:
         name = text_of(table, "mesh", "name a mesh file")
         if len(of_files) == 2:
             raise InputError("has both `part` and `geometry`; give it one of them")
+        path = self.folder / name
+        if name not in self._files:
+            with in_place("mesh"):
+                self._files[name] = mesh_files.load_file(path)
+        parts = self._files[name].parts
         if "geometry" in table:
             geometry = text_of(table, "geometry", "name a geometry of the mesh file")
-            with in_place("mesh"):
-                found = self._files.setdefault(name, mesh_files.load_file(self.folder / name))
-            return [(None, mesh_files.choose_geometry(self.folder / name, found.parts, geometry))]
-        if name not in self._parts:
-            with in_place("mesh"):
-                self._parts[name] = mesh_files.load_parts(self.folder / name)
-        parts = self._parts[name]
+            return [(None, mesh_files.choose_geometry(path, parts, geometry))]
         if "part" in table:
             part = text_of(table, "part", "name a part of the mesh file")
-            parts = (mesh_files.choose_part(self.folder / name, parts, part),)
-        return [(p.name, p.mesh) for p in parts]
+            parts = (mesh_files.choose_part(path, parts, part),)
+        return [(part.name, mesh_files.placed_part(path, part).mesh) for part in parts]

@@ -339,17 +339,21 @@ def test_files_outside_the_folder_are_not_read(tmp_path: Path) -> None:
             read(path, allow_outside=True)
 
 
-def test_a_file_beside_it_that_changed_is_read_again(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("node", "least"), [({}, [-1, -1, 0]), ({"translation": [5, 0, 0]}, [4, -1, 0])])
+def test_a_file_beside_it_that_changed_is_read_again(
+    tmp_path: Path, node: dict[str, Any], least: list[float]
+) -> None:
     builder = GltfBuilder()
     quad = builder.quad()
-    document = builder.document([quad])
+    document = builder.document([quad], nodes=[{"mesh": 0, **node}])
     document["buffers"][0]["uri"] = "b%20c.bin"
     (tmp_path / "a.gltf").write_text(json.dumps(document))
     (tmp_path / "b c.bin").write_bytes(builder.content)
     mesh = mesh_files.load_mesh(tmp_path / "a.gltf")
     assert mesh_files.load_mesh(tmp_path / "a.gltf") is mesh
+    assert mesh.bounds[0].tolist() == least
     (tmp_path / "b c.bin").write_bytes(builder.content.replace(np.float32(-1).tobytes(), bytes(4)) + bytes(4))
-    assert mesh_files.load_mesh(tmp_path / "a.gltf").bounds[0].tolist() == [0, 0, 0]
+    assert mesh_files.load_mesh(tmp_path / "a.gltf").bounds[0].tolist() == [least[0] + 1, 0, 0]
 
 
 # ------------------------------------------------------------------------------------------ animations
