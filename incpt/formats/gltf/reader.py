@@ -53,6 +53,8 @@ def read_gltf(path: Path) -> MeshFile:
     parts = _Parts(document, accessors, nodes).of(in_scene)
     bounds = _bounds(parts)
     lights = tuple(light for node in in_scene if (light := light_of(node, document)) is not None)
+    if lights:
+        import_report.changed("the units of lights: candela and lux are taken for W / sr and W / m²")
     cameras: dict[str, Camera] = {}
     # Under the name that is left out stands the camera of files that have none.
     names = Names(CAMERA_NAME)

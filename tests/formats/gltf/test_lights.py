@@ -13,7 +13,8 @@ import pytest
 import trimesh
 
 from incpt.core.errors import InputError, InputWarning
-from incpt.formats.registry import load
+from incpt.formats.import_report import Fate
+from incpt.formats.registry import load, load_with_report
 from incpt.scene.model import Scene
 
 LIGHTS: list[dict[str, Any]] = [
@@ -69,6 +70,12 @@ def test_lights_come_with_the_meshes(tmp_path: Path) -> None:
     assert spot.emitted[0] == pytest.approx(5)
     assert sun.irradiance == 3 and not sun.has_size
     np.testing.assert_allclose(-sun.axes[2], (-1, 0, 0), atol=1e-12)
+
+
+def test_that_units_change_is_told(tmp_path: Path) -> None:
+    scene_of(tmp_path, NODES, LIGHTS)
+    _, report = load_with_report(tmp_path / "model.gltf")
+    assert "the units of lights: candela" in report.of(Fate.CHANGED)[0].text and report.is_whole
 
 
 def test_names_differ(tmp_path: Path) -> None:
