@@ -133,7 +133,8 @@ def _repeated(
 def _hashes(vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int64]) -> npt.NDArray[np.uint64]:
     """(F,) the same for faces with the same positions in the same order, wherever it begins."""
     # Adding zero makes one of the two zeros.
-    bits = (vertices + np.float32(0)).view(np.uint32).astype(np.uint64)
+    with np.errstate(invalid="ignore"):
+        bits = (vertices + np.float32(0)).view(np.uint32).astype(np.uint64)
     of_vertices = _mixed(_mixed(_mixed(bits[:, 0]) + bits[:, 1]) + bits[:, 2])
     found = np.empty(len(faces), np.uint64)
     for first in range(0, len(faces), _PIECE):

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from incpt.core.errors import InputError, InputWarning
 from incpt.formats import mesh_files, mesh_store
+from incpt.formats.clean import usable_mesh
 from incpt.scene.mesh import Mesh
 from incpt.scene.shapes import shape
 
@@ -224,6 +225,19 @@ def test_bad_faces_are_left_out_and_told(tmp_path: Path) -> None:
     )
     assert mesh.faces.tolist() == [[0, 1, 2], [2, 1, 0], [1, 3, 2]]
     assert np.isfinite(mesh.vertices).all()
+
+
+def test_numbers_that_signal_are_no_numbers() -> None:
+    """A NaN of this kind makes numpy warn when anything is done with it."""
+    vertices = np.zeros((4, 3), np.float32)
+    vertices[1:] = np.eye(3)
+    vertices.view(np.uint32)[0, 0] = 0x7F800001
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        counts: dict[str, int] = {}
+        mesh = usable_mesh(vertices, TETRAHEDRON_FACES, None, counts)
+    assert mesh is not None and len(mesh.faces) == 1
+    assert counts["with a vertex that is not finite or too far away"] == 3
 
 
 def test_obj_with_relative_and_impossible_indices(tmp_path: Path) -> None:
