@@ -70,6 +70,12 @@ class Accessors:
         raw = self.raw(number, *widths)
         return as_floats(raw, table.flag("normalized"))
 
+    def doubles(self, number: int, *widths: int) -> npt.NDArray[np.float64]:
+        """The same in double precision, for matrices and times."""
+        # Numbers that are none may make numpy warn; whoever uses them looks for them.
+        with np.errstate(invalid="ignore"):
+            return self.floats(number, *widths).astype(np.float64)
+
     def raw(self, number: int, *widths: int) -> Array:
         """(count, width) as stored, with what a sparse accessor puts in other values' place. Raises
         InputError."""

@@ -82,8 +82,8 @@ def _sampled(sampler: Table, pointer: str, time: float, accessors: Accessors) ->
     kind = sampler.text("interpolation", "LINEAR")
     with sampler.in_messages():
         one_of("interpolation", kind, _INTERPOLATIONS)
-        times = accessors.floats(sampler.whole("input", 0, 1 << 31), 1)[:, 0].astype(np.float64)
-        raw = accessors.floats(sampler.whole("output", 0, 1 << 31), 1, 2, 3, 4).astype(np.float64)
+        times = accessors.doubles(sampler.whole("input", 0, 1 << 31), 1)[:, 0]
+        raw = accessors.doubles(sampler.whole("output", 0, 1 << 31), 1, 2, 3, 4)
         if not (np.isfinite(times).all() and np.isfinite(raw).all() and (np.diff(times) > 0).all()):
             raise InputError("holds times that do not grow, or a number that is not finite")
         per_key = 3 if kind == "CUBICSPLINE" else 1

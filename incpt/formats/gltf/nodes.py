@@ -174,7 +174,7 @@ def instances(node: Table, accessors: Accessors) -> Matrix | None:
         for name, default in _PROPERTIES.items():
             number = names.index(name.upper())
             if number is not None:
-                values = accessors.floats(number, len(default)).astype(np.float64)
+                values = accessors.doubles(number, len(default))
                 found[name] = np.clip(np.nan_to_num(values), -LARGEST, LARGEST)
         counts = {len(values) for values in found.values()}
         if len(counts) != 1:

@@ -201,7 +201,7 @@ def _blended(
     number = 0
     while f"JOINTS_{number}" in names and f"WEIGHTS_{number}" in names:
         chosen = accessors.raw(names.whole(f"JOINTS_{number}", 0, 1 << 31), 4)
-        weights = accessors.floats(names.whole(f"WEIGHTS_{number}", 0, 1 << 31), 4).astype(np.float64)
+        weights = accessors.doubles(names.whole(f"WEIGHTS_{number}", 0, 1 << 31), 4)
         if chosen.dtype.kind != "u" or len(chosen) != count or len(weights) != count:
             raise InputError(f"attributes.JOINTS_{number}: do not fit the mesh; the file is damaged")
         if chosen.max() >= len(joints):

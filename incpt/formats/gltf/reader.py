@@ -186,7 +186,7 @@ class _Parts:
                 joints = np.stack([self._nodes.worlds[joint] for joint in numbers])
                 inverse = table.index("inverseBindMatrices")
                 if inverse is not None:
-                    stored = self._accessors.floats(inverse, 16).astype(np.float64)
+                    stored = self._accessors.doubles(inverse, 16)
                     if len(stored) < len(joints):
                         raise InputError("inverseBindMatrices: are fewer than joints; the file is damaged")
                     # Matrices are stored column by column. What is not finite ends in vertices that are

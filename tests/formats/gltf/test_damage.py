@@ -141,3 +141,13 @@ def test_the_file_that_is_mutated_is_read_whole(tmp_path: Path) -> None:
 @given(st.randoms(use_true_random=False), st.sampled_from(["gltf", "glb"]))
 def test_mutated_files_raise_input_errors_or_load(tmp_path: Path, choose: random.Random, suffix: str) -> None:
     check_reads_or_explains(write_mutated(tmp_path / f"a.{suffix}", choose))
+
+
+def test_numbers_that_signal_are_no_numbers(tmp_path: Path) -> None:
+    """A NaN of this kind makes numpy warn when anything is done with it; here all floats are such."""
+    content = np.frombuffer(CONTENT[: len(CONTENT) // 4 * 4], np.uint32).copy()
+    for accessor in DOCUMENT["accessors"]:
+        if accessor["componentType"] == 5126:
+            view = DOCUMENT["bufferViews"][accessor["bufferView"]]
+            content[view["byteOffset"] // 4 :][: view["byteLength"] // 4] = 0x7F800001
+    assert not check_reads_or_explains(write_document(tmp_path / "a.glb", DOCUMENT, content.tobytes()))
