@@ -2,12 +2,14 @@
 
 It measures intensity in candela and illuminance in lux. Here they are taken for W / sr and W / m² as they
 are, like its emission, which is in nits there and a radiance here: so lamps and glowing surfaces of a file
-keep their proportions, and an exposure is all that is between its numbers and ours.
+keep their proportions, and an exposure is all that is between its numbers and ours. Blender's exporter makes
+candela of its watts by a factor, and leaves glowing surfaces as they are; in its files that is taken back.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -21,7 +23,19 @@ from incpt.formats.gltf.table import Table
 from incpt.scene.light import LARGEST_STRENGTH, Light
 
 EXTENSION = "KHR_lights_punctual"
+_BLENDER = re.compile(r"Khronos glTF Blender I/O v(\d+)\.(\d+)")
+_BLENDER_SINCE = (3, 6)
+"""The version from which on it does so by default."""
+_LUMENS_PER_WATT = 683
+"""Of light at 555 nm, which Blender takes for all light."""
 _KINDS = {"point": "point", "spot": "spot", "directional": "sun"}
+
+
+def watts_of(document: Document) -> float:
+    """What a candela of a file counts for in W / sr, and a lux in W / m². Raises InputError."""
+    made_by = _BLENDER.match(document.root.table("asset").text("generator"))
+    is_blender = made_by is not None and tuple(map(int, made_by.groups())) >= _BLENDER_SINCE
+    return 1 / _LUMENS_PER_WATT if is_blender else 1.0
 
 
 def light_of(node: Node, document: Document) -> Light | None:
@@ -38,15 +52,15 @@ def light_of(node: Node, document: Document) -> Light | None:
     with in_place(f"light {node.name!r}"):
         if "range" in table:
             import_report.left_out(f"the range of light {node.name!r}: light has none")
-        return replace(_light(table, node), visible=node.is_visible)
+        return replace(_light(table, node, watts_of(document)), visible=node.is_visible)
 
 
-def _light(table: Table, node: Node) -> Light:
+def _light(table: Table, node: Node, watts: float) -> Light:
     kind = table.text("type")
     one_of("type", kind, _KINDS)
     kind = _KINDS[kind]
     position, rotation, _ = affine.decompose(node.world[:3])
-    intensity = table.number("intensity", 1.0, 0.0, LARGEST_STRENGTH)
+    intensity = watts * table.number("intensity", 1.0, 0.0, LARGEST_STRENGTH)
     values: dict[str, Any] = {
         "color": table.numbers("color", (1.0, 1.0, 1.0), -math.inf),
         "radius": 0.0,

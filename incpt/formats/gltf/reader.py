@@ -22,7 +22,7 @@ from incpt.formats.gltf.animation import animate
 from incpt.formats.gltf.cameras import camera_of
 from incpt.formats.gltf.compression import DRACO
 from incpt.formats.gltf.document import Document
-from incpt.formats.gltf.lights import light_of
+from incpt.formats.gltf.lights import light_of, watts_of
 from incpt.formats.gltf.materials import Materials
 from incpt.formats.gltf.names import Names
 from incpt.formats.gltf.nodes import Node, Nodes, instances
@@ -54,7 +54,8 @@ def read_gltf(path: Path) -> MeshFile:
     bounds = _bounds(parts)
     lights = tuple(light for node in in_scene if (light := light_of(node, document)) is not None)
     if lights:
-        import_report.changed("the units of lights: candela and lux are taken for W / sr and W / m²")
+        factor = "" if watts_of(document) == 1 else ", 683 of them for one, as Blender's exporter has them"
+        import_report.changed(f"the units of lights: candela and lux are taken for W / sr and W / m²{factor}")
     cameras: dict[str, Camera] = {}
     # Under the name that is left out stands the camera of files that have none.
     names = Names(CAMERA_NAME)

@@ -37,7 +37,7 @@ NODES = [
 ]  # fmt: skip
 
 
-def scene_of(folder: Path, nodes: list[dict[str, Any]], lights: Any) -> Scene:
+def scene_of(folder: Path, nodes: list[dict[str, Any]], lights: Any, generator: str = "hand") -> Scene:
     """A cube and these nodes; -1 among children means the node behind it. The last is in no scene."""
     path = folder / "model.gltf"
     for name, content in trimesh.exchange.gltf.export_gltf(trimesh.creation.box().scene()).items():
@@ -49,6 +49,7 @@ def scene_of(folder: Path, nodes: list[dict[str, Any]], lights: Any) -> Scene:
         document["nodes"].append({**node, "children": children} if children else node)
     below = {child for node in document["nodes"] for child in node.get("children", [])}
     document["scenes"][0]["nodes"] += [first + i for i in range(len(nodes) - 1) if first + i not in below]
+    document["asset"]["generator"] = generator
     document["extensionsUsed"] = ["KHR_lights_punctual"]
     document["extensions"] = {"KHR_lights_punctual": {"lights": lights}}
     path.write_text(json.dumps(document))
@@ -76,6 +77,18 @@ def test_that_units_change_is_told(tmp_path: Path) -> None:
     scene_of(tmp_path, NODES, LIGHTS)
     _, report = load_with_report(tmp_path / "model.gltf")
     assert "the units of lights: candela" in report.of(Fate.CHANGED)[0].text and report.is_whole
+
+
+@pytest.mark.parametrize(
+    ("version", "factor"), [("4.2.70", 683), ("3.6.5", 683), ("3.3.36", 1), ("10.0.1", 683), ("x", 1)]
+)
+def test_lamps_of_blender_have_its_watts(tmp_path: Path, version: str, factor: float) -> None:
+    """As its importer reads them. Up to 3.3 its exporter had another way."""
+    scene = scene_of(tmp_path, NODES, LIGHTS, f"Khronos glTF Blender I/O v{version}")
+    point, _, sun = scene.lights
+    assert point.emitted[0] == pytest.approx(100 / factor) and sun.irradiance == pytest.approx(3 / factor)
+    text = load_with_report(tmp_path / "model.gltf")[1].of(Fate.CHANGED)[0].text
+    assert ("683" in text) == (factor > 1)
 
 
 def test_names_differ(tmp_path: Path) -> None:
