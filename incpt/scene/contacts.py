@@ -156,7 +156,14 @@ def _coincide(
 
 
 def _grown(obj: Object, share: float) -> Object:
-    """The object grown about its middle by such a share of its size."""
+    """The object grown about its middle by such a share of its size; the same one for the same again."""
+    before = _GROWN.get(obj)
+    if before is None or before[0] != share:
+        before = _GROWN[obj] = share, _make_grown(obj, share)
+    return before[1]
+
+
+def _make_grown(obj: Object, share: float) -> Object:
     matrix = obj.world_from_object.copy()
     matrix[:, :3] *= 1 + share
     matrix[:, 3] = _middle(obj) + (1 + share) * (matrix[:, 3] - _middle(obj))
@@ -165,3 +172,5 @@ def _grown(obj: Object, share: float) -> Object:
 
 _KNOWN: WeakKeyDictionary[Object, _Faces] = WeakKeyDictionary()
 """The faces of bodies that were asked for, as long as those live: a drag asks again and again."""
+_GROWN: WeakKeyDictionary[Object, tuple[float, Object]] = WeakKeyDictionary()
+"""Bodies that are grown, by which share, and what they were grown to."""

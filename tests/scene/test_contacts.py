@@ -81,3 +81,10 @@ def test_contact_is_found_wherever_it_is(position: Vector, turn: Vector) -> None
         for obj in (GLASS, WATER)
     ]
     assert set(grown_bodies(scene_of(*placed))) == {"water"}
+
+
+def test_a_body_that_stays_in_contact_is_the_same_object() -> None:
+    """So that an edit of another one does not describe it again."""
+    scene = scene_of(GLASS, WATER, Object("stone", shape("cube"), "stone"))
+    moved = scene.with_object("stone", position=(0, 5, 0))
+    assert separated(moved)[1] is separated(scene)[1] is not WATER
