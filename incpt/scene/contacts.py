@@ -1,8 +1,8 @@
 """Transparent bodies whose faces coincide.
 
 Of two faces at one distance a ray meets one, by chance of rounding, and starts behind the other. So of two
-bodies in contact the smaller is grown by some roundings: their faces then lie in an order, and what is in
-both is sorted out by priority, as of all nested dielectrics (C. M. Schmidt and B. Budge, Simple Nested
+bodies in contact one is grown by some roundings: their faces then lie in an order, and what is in both is
+sorted out by priority, as of all nested dielectrics (C. M. Schmidt and B. Budge, Simple Nested
 Dielectrics in Ray Traced Images, JGT 7(2), 2002).
 """
 
@@ -40,31 +40,35 @@ def separated(scene: Scene) -> tuple[Object, ...]:
 
 
 def grown_bodies(scene: Scene) -> dict[str, Object]:
-    """The bodies of a scene that are in contact with a larger one, by name, as they are grown."""
+    """Of the bodies of a scene that are in contact those that are grown, by name, as they are then."""
     bodies = [obj for obj in scene.objects if obj.visible and scene.material(obj.material).is_body]
-    # The largest first; each is grown by more than those that it touches.
+    # The largest first; each by as many steps as those before leave it.
     bodies.sort(key=lambda obj: -float(np.prod(np.ptp(obj.world_bounds, axis=0))))
     bounds = np.array([obj.world_bounds for obj in bodies]).reshape(-1, 2, 3)
     levels: list[int] = []
     found: dict[str, Object] = {}
     for place, obj in enumerate(bodies):
-        heights, level, reach = [], 0, 0.0
+        heights: list[float] = []
+        reach = 0.0
+        refused: set[int] = set()
         for other in _boxes_met(bounds[:place], bounds[place]):
-            touching = _touching(_faces_of(obj), _faces_of(bodies[other]))
-            if touching.any():
-                heights.append(_faces_of(obj).height[touching].min())
-                level, reach = max(level, levels[other] + 1), max(reach, _reach(obj, bodies[other]))
-        levels.append(level)
+            contact = _contact(_faces_of(obj), _faces_of(bodies[other]))
+            if contact is not None:
+                heights.append(contact.height)
+                reach = max(reach, _reach(obj, bodies[other]))
+                refused |= contact.refused(levels[other])
+        level = next(level for level in range(len(bodies)) if level not in refused)
         share = level * _GROWTH * reach / min(heights) if heights and min(heights) > 0 else 0.0
         if 0 < share <= _MOST_GROWTH:
             found[obj.name] = _grown(obj, share)
+        levels.append(level if obj.name in found else 0)
     return found
 
 
 @dataclass(frozen=True, eq=False)
 class _Faces:
-    """The faces of a body in world space: corners (F, 3, 3), unit normals (F, 3), and the height (F,) of each
-    over the middle of the body, below 0 where the face looks towards it."""
+    """The faces of a body in world space: corners (F, 3, 3), unit normals (F, 3) that look out of it, and the
+    height (F,) of each over the middle of the body, below 0 where the face looks towards it."""
 
     corners: Array
     normal: Array
@@ -84,8 +88,8 @@ def _make_faces(obj: Object) -> _Faces:
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     corners, normal = corners[length[:, 0] > 0], normal[length[:, 0] > 0] / length[length[:, 0] > 0]
-    outside = normal * np.sign(np.linalg.det(matrix[:, :3]))
-    return _Faces(corners, normal, np.sum((corners[:, 0] - _middle(obj)) * outside, axis=1))
+    normal *= np.sign(np.linalg.det(matrix[:, :3]))
+    return _Faces(corners, normal, np.sum((corners[:, 0] - _middle(obj)) * normal, axis=1))
 
 
 def _middle(obj: Object) -> Array:
@@ -104,13 +108,30 @@ def _boxes_met(boxes: Array, box: Array) -> list[int]:
     return np.flatnonzero(meet.all(axis=1)).tolist()
 
 
-def _touching(a: _Faces, b: _Faces) -> npt.NDArray[np.bool_]:
-    """(F,) which faces of a body lie in the plane of a face of another one, whose box they meet."""
+@dataclass(frozen=True)
+class _Contact:
+    """Of a body with a larger one. height: the least of its faces in contact; is_alike: whether some look the
+    same way as those of the other; is_in_hole: whether some of the other's look towards its middle."""
+
+    height: float
+    is_alike: bool
+    is_in_hole: bool
+
+    def refused(self, level: int) -> set[int]:
+        """By how many steps it must not grow if the other grows by `level`. Face to face, one must grow;
+        where they look the same way, one more than the other; and what fills a hole, more than the hole."""
+        refused = {0} if level == 0 else set()
+        if self.is_alike:
+            refused.add(level)
+        return refused | set(range(level + 1)) if self.is_in_hole else refused
+
+
+def _contact(a: _Faces, b: _Faces) -> _Contact | None:
+    """How the faces of a body touch those of another one: in their planes, and where their boxes meet."""
     slack = _CONTACT * max(float(np.abs(faces.corners).max()) for faces in (a, b))
-    found = np.zeros(len(a.corners), np.bool_)
     first, second = _near(a, b, slack), _near(b, a, slack)
     if not (len(first) and len(second)):
-        return found
+        return None
     center = a.corners[first[0], 0]
     keys = [_plane_key(faces, chosen, center) for faces, chosen in ((a, first), (b, second))]
     order = np.argsort(keys[1])
@@ -119,13 +140,21 @@ def _touching(a: _Faces, b: _Faces) -> npt.NDArray[np.bool_]:
     margin = _KEY_MARGIN / _CONTACT * slack
     begin, end = (np.searchsorted(ordered, keys[0] + side * margin) for side in (-1, 1))
     ends = np.cumsum(end - begin)
+    none = np.zeros(0, np.int64)
+    ones, others = [none], [none]
     for start in range(0, int(ends[-1]), _PAIRS_AT_ONCE):
         pair = np.arange(start, min(start + _PAIRS_AT_ONCE, int(ends[-1])))
         row = np.searchsorted(ends, pair, side="right")
         one = first[row]
         other = second[begin[row] + pair - (ends[row] - (end - begin)[row])]
-        found[one[_coincide(a, one, b, other, slack)]] = True
-    return found
+        touch = _coincide(a, one, b, other, slack)
+        ones.append(one[touch])
+        others.append(other[touch])
+    one, other = np.concatenate(ones), np.concatenate(others)
+    if not len(one):
+        return None
+    is_alike = bool((np.sum(a.normal[one] * b.normal[other], axis=1) > 0).any())
+    return _Contact(float(a.height[one].min()), is_alike, bool((b.height[other] < 0).any()))
 
 
 def _near(a: _Faces, b: _Faces, slack: float) -> npt.NDArray[np.int64]:

@@ -88,3 +88,13 @@ def test_a_body_that_stays_in_contact_is_the_same_object() -> None:
     scene = scene_of(GLASS, WATER, Object("stone", shape("cube"), "stone"))
     moved = scene.with_object("stone", position=(0, 5, 0))
     assert separated(moved)[1] is separated(scene)[1] is not WATER
+
+
+def test_many_bodies_side_by_side_grow_by_few_steps() -> None:
+    """Each pair that touches face to face overlaps."""
+    cubes = [Object(f"{i}", shape("cube"), "glass", (i % 6, 0, i // 6)) for i in range(36)]
+    bounds = np.array([obj.world_bounds for obj in separated(scene_of(*cubes))])
+    growth = (np.ptp(bounds, axis=1)[:, 0] - 1) / 2
+    assert growth.max() < 4e-4
+    for i, j in ((0, 1), (0, 6), (7, 8), (20, 26), (34, 35)):
+        assert growth[i] + growth[j] > 1e-5
