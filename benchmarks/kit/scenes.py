@@ -1,13 +1,13 @@
 """The scenes on which incpt is compared with other renderers, and larger ones to see how cost grows.
 
-Their materials are those that every compared renderer has exactly: Lambertian, smooth glass, and GGX metal
-without a tint, whose Fresnel factor is 1.
+Their materials are those that every compared renderer has exactly: Lambertian, also by an image, smooth
+glass, and GGX metal without a tint, whose Fresnel factor is 1.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 
 import numpy as np
@@ -20,6 +20,7 @@ from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
+from incpt.scene.texture import Bitmap, Texture
 
 FULL_CIRCLE = 2 * np.pi
 
@@ -159,12 +160,71 @@ def plates() -> Scene:
     return Scene(camera, Environment(color=(0.05, 0.05, 0.06)), materials, tuple(objects))
 
 
+def textured() -> Scene:
+    """The wavy ball, the blocks and the floor of the box, each with an image of its own."""
+    colors = ((0.8, 0.5, 0.3), (0.3, 0.6, 0.8), (0.5, 0.8, 0.4))
+    images = [Material(specular=0, base_color=(1, 1, 1), base_color_texture=Texture(_stripes(i, color)))
+              for i, color in enumerate(colors)]  # fmt: skip
+    box = {obj.name: obj for obj in _box()}
+    box["floor"] = replace(box["floor"], material="image 0")
+    objects = [
+        *box.values(),
+        cube("tall", "image 1", (-0.45, 0.6, -0.4), (0, 18, 0), (0.5, 1.2, 0.5)),
+        cube("short", "image 1", (0.55, 0.2, 0.45), (0, -17, 0), (0.4, 0.4, 0.4)),
+        Object("ball", wrapped(wavy_sphere(6)), "image 2", (0.2, 0.9, -0.05), scale=(0.7,) * 3),
+    ]
+    materials = {**_BOX_MATERIALS, **{f"image {i}": image for i, image in enumerate(images)}}
+    return Scene(Camera((0, 1, 3.6), (0, 1, 0), fov_y=39), Environment(), materials, tuple(objects))
+
+
+@cache
+def _stripes(number: int, color: Vector, size: int = 1024) -> Bitmap:
+    """Waves of a colour, and grains of it, as bytes."""
+    y, x = np.mgrid[:size, :size] / size * FULL_CIRCLE
+    waves = 0.5 + 0.25 * np.sin((7 + number) * x + 3 * np.sin(5 * y)) + 0.15 * np.sin(60 * y)
+    grains = np.random.default_rng(number).uniform(0.8, 1.0, (size, size))
+    return Bitmap(np.rint(255 * np.clip((waves * grains)[..., None] * color, 0, 1)).astype(np.uint8))
+
+
+def wrapped(mesh: Mesh) -> Mesh:
+    """A mesh around the origin with texture coordinates by longitude and latitude."""
+    corners = mesh.vertices[mesh.faces].astype(np.float64)
+    x, y, z = np.moveaxis(corners / np.linalg.norm(corners, axis=2, keepdims=True), 2, 0)
+    u = np.arctan2(x, z) / FULL_CIRCLE + 0.5
+    # Faces across the seam go on beyond it.
+    u += (np.ptp(u, axis=1, keepdims=True) > 0.5) & (u < 0.5)
+    uvs = np.stack([u, 0.5 - np.arcsin(np.clip(y, -1, 1)) / np.pi], axis=2)
+    return replace(mesh, uvs=(uvs.astype(np.float32),))
+
+
+@cache
+def lanterns(count: int) -> Scene:
+    """The Cornell box with its lamp cut into `count` panes of the same power together."""
+    box = cornell()
+    rows = int(np.ceil(count**0.5))
+    pitch = (0.5 / rows, 0.42 / rows)
+    area = 4 * 0.24 * 0.2 / (count * 0.64 * pitch[0] * pitch[1])
+    panes = [
+        plane(
+            f"pane {i}", "lamp",
+            ((i % rows + 0.5) * pitch[0] - 0.25, 1.99, (i // rows + 0.5) * pitch[1] - 0.21),
+            (180, 0, 0), (0.8 * pitch[0], 1, 0.8 * pitch[1]),
+        )
+        for i in range(count)
+    ]  # fmt: skip
+    rest = tuple(obj for obj in box.objects if not obj.name.startswith("lamp"))
+    materials = {**box.materials, "lamp": lamp(17 * area, 12 * area, 4 * area)}
+    return Scene(box.camera, box.environment, materials, (*rest, *panes))
+
+
 SCENES = {
     "cornell": BenchmarkScene(cornell, 42, 2, 12, "tall"),
     # Deep enough that nothing is cut off: renderers that count every bounce alike then do the same work.
     "glass": BenchmarkScene(glass, 88, 16, 24, "cube 6"),
     "sphere": BenchmarkScene(sphere, 327_700, 2, 12, "ball"),
     "plates": BenchmarkScene(plates, 1_332, 2, 12, "plate 2"),
+    "textured": BenchmarkScene(textured, 81_962, 2, 12, "ball"),
+    "lanterns": BenchmarkScene(partial(lanterns, 1_000), 2_034, 2, 12, "tall"),
 }
 
 
@@ -251,23 +311,3 @@ def crowd(count: int, mesh: Mesh | None = None) -> Scene:
     materials = {"matte": matte(0.6, 0.5, 0.4), "floor": matte(0.5, 0.5, 0.5)}
     sky = Environment(color=(0.8, 0.9, 1.0))
     return Scene(Camera((0, 2.5, 4.5), (0, 0, 0), fov_y=45), sky, materials, (floor, *objects))
-
-
-@cache
-def lanterns(count: int) -> Scene:
-    """The Cornell box with its lamp cut into `count` panes of the same power together."""
-    box = cornell()
-    rows = int(np.ceil(count**0.5))
-    pitch = (0.5 / rows, 0.42 / rows)
-    area = 4 * 0.24 * 0.2 / (count * 0.64 * pitch[0] * pitch[1])
-    panes = [
-        plane(
-            f"pane {i}", "lamp",
-            ((i % rows + 0.5) * pitch[0] - 0.25, 1.99, (i // rows + 0.5) * pitch[1] - 0.21),
-            (180, 0, 0), (0.8 * pitch[0], 1, 0.8 * pitch[1]),
-        )
-        for i in range(count)
-    ]  # fmt: skip
-    rest = tuple(obj for obj in box.objects if not obj.name.startswith("lamp"))
-    materials = {**box.materials, "lamp": lamp(17 * area, 12 * area, 4 * area)}
-    return Scene(box.camera, box.environment, materials, (*rest, *panes))

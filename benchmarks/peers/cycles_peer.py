@@ -21,10 +21,10 @@ import numpy as np
 
 from incpt.benchmarks.peers.peer import FloatImage, Job, MissingPeer
 from incpt.core.affine import Vector
-from incpt.core.layout import MIN_ALPHA
+from incpt.core.layout import MIN_ALPHA, TextureSlot
 from incpt.formats.images import load_image
 from incpt.scene.camera import Camera
-from incpt.scene.material import Material
+from incpt.scene.material import Material, texture_of
 
 _OVERHEAD_SPP = 2
 _ATTEMPTS = 3
@@ -215,6 +215,8 @@ def _shader(nodes: Any, links: Any, made: Any, material: Material) -> Any:
     """What of our materials has an exact counterpart; raises ValueError for anything else."""
     alpha = max(material.roughness**2, MIN_ALPHA)
     white = material.base_color == (1, 1, 1)
+    if any(texture_of(material, slot) is not None for slot in TextureSlot):
+        raise ValueError("textures are not translated for Cycles")
     if material.is_emissive:
         return _emission(nodes, links, made, material)
     if material.transmission == 1 and white and not any(material.absorption) and material.roughness == 0:
