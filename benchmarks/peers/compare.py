@@ -77,19 +77,27 @@ class Pool:
         self.samples: dict[tuple[str, str], int] = {}
 
     def worker(self, peer: str, scene: str, job: Job) -> Worker:
-        """With the scene loaded. Raises MissingPeer."""
-        if peer in self.missing:
-            raise MissingPeer(self.missing[peer])
+        """With the scene loaded. Raises MissingPeer, also where it has no counterpart of what is in the
+        scene; that says nothing of other scenes."""
+        problem = self.problem(peer, scene)
+        if problem is not None:
+            raise MissingPeer(problem)
+        key = peer
         try:
             if peer not in self._workers:
                 self._workers[peer] = Worker(peer, self._threads, self._device)
+            key = f"{peer} on {scene}"
             if self._loaded.get(peer) != scene:
                 self._workers[peer].load(job)
                 self._loaded[peer] = scene
         except MissingPeer as missing:
-            self.missing[peer] = f"{peer}: {missing}"
-            raise MissingPeer(self.missing[peer]) from None
+            self.missing[key] = f"{key}: {missing}"
+            raise MissingPeer(self.missing[key]) from None
         return self._workers[peer]
+
+    def problem(self, peer: str, scene: str) -> str | None:
+        """Why there is no worker with that scene, as far as is known."""
+        return self.missing.get(peer) or self.missing.get(f"{peer} on {scene}")
 
     def close(self) -> None:
         """End all of them."""
@@ -225,8 +233,9 @@ class _SceneBench:
         return self._pool.samples[key]
 
     def _disagreement(self, peer: str) -> str | None:
-        if peer in self._pool.missing:
-            return self._pool.missing[peer]
+        problem = self._pool.problem(peer, self._scene)
+        if problem is not None:
+            return problem
         wanted = self.check(peer).subject
         for record in reversed(self._store.read().where(**wanted)):
             if record.values["agrees"]:

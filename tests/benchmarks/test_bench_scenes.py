@@ -155,6 +155,24 @@ def test_peers_are_checked_then_timed(
     ]
 
 
+def test_what_a_peer_lacks_for_one_scene_is_no_matter_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Untextured:
+        def __init__(self, *_: object) -> None:
+            self.scenes: list[str] = []
+
+        def load(self, job: Job) -> None:
+            if "ball" in job.scene.object_index:
+                raise MissingPeer("ValueError: has no counterpart")
+
+    monkeypatch.setattr(compare, "Worker", Untextured)
+    pool, plan = compare.Pool(1), compare.Plan(["textured", "cornell"], ["mitsuba"])
+    for _ in range(2):
+        with pytest.raises(MissingPeer, match="^mitsuba on textured: ValueError: has no counterpart$"):
+            pool.worker("mitsuba", "textured", plan.job("textured"))
+        pool.worker("mitsuba", "cornell", plan.job("cornell"))
+    assert pool.problem("mitsuba", "cornell") is None
+
+
 def test_finished_comparison_starts_nobody(
     monkeypatch: pytest.MonkeyPatch, device: Device, tmp_path: Path
 ) -> None:
