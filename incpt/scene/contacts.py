@@ -46,10 +46,11 @@ def grown_bodies(scene: Scene) -> dict[str, Object]:
     bodies.sort(key=lambda obj: -float(np.prod(np.ptp(obj.world_bounds, axis=0))))
     bounds = np.array([obj.world_bounds for obj in bodies]).reshape(-1, 2, 3)
     levels: list[int] = []
+    shares: list[float] = []
     found: dict[str, Object] = {}
     for place, obj in enumerate(bodies):
         heights: list[float] = []
-        reach = 0.0
+        reach = least = 0.0
         refused: set[int] = set()
         for other in _boxes_met(bounds[:place], bounds[place]):
             contact = _contact(_faces_of(obj), _faces_of(bodies[other]))
@@ -57,11 +58,16 @@ def grown_bodies(scene: Scene) -> dict[str, Object]:
                 heights.append(contact.height)
                 reach = max(reach, _reach(obj, bodies[other]))
                 refused |= contact.refused(levels[other])
+                if contact.hole > 0:  # what fills it grows more than the hole
+                    own = _reach(obj, bodies[other])
+                    least = max(least, shares[other] * contact.hole + _GROWTH * own)
         level = next(level for level in range(len(bodies)) if level not in refused)
-        share = level * _GROWTH * reach / min(heights) if heights and min(heights) > 0 else 0.0
+        by = max(level * _GROWTH * reach, least)
+        share = by / min(heights) if heights and min(heights) > 0 else 0.0
         if 0 < share <= _MOST_GROWTH:
             found[obj.name] = _grown(obj, share)
         levels.append(level if obj.name in found else 0)
+        shares.append(share if obj.name in found else 0.0)
     return found
 
 
@@ -111,19 +117,16 @@ def _boxes_met(boxes: Array, box: Array) -> list[int]:
 @dataclass(frozen=True)
 class _Contact:
     """Of a body with a larger one. height: the least of its faces in contact; is_alike: whether some look the
-    same way as those of the other; is_in_hole: whether some of the other's look towards its middle."""
+    same way as those of the other; hole: the greatest height of the other's that look towards its middle."""
 
     height: float
     is_alike: bool
-    is_in_hole: bool
+    hole: float
 
     def refused(self, level: int) -> set[int]:
         """By how many steps it must not grow if the other grows by `level`. Face to face, one must grow;
-        where they look the same way, one more than the other; and what fills a hole, more than the hole."""
-        refused = {0} if level == 0 else set()
-        if self.is_alike:
-            refused.add(level)
-        return refused | set(range(level + 1)) if self.is_in_hole else refused
+        where they look the same way, one more than the other."""
+        return ({0} if level == 0 else set()) | ({level} if self.is_alike else set())
 
 
 def _contact(a: _Faces, b: _Faces) -> _Contact | None:
@@ -154,7 +157,7 @@ def _contact(a: _Faces, b: _Faces) -> _Contact | None:
     if not len(one):
         return None
     is_alike = bool((np.sum(a.normal[one] * b.normal[other], axis=1) > 0).any())
-    return _Contact(float(a.height[one].min()), is_alike, bool((b.height[other] < 0).any()))
+    return _Contact(float(a.height[one].min()), is_alike, max(float(-b.height[other].min()), 0.0))
 
 
 def _near(a: _Faces, b: _Faces, slack: float) -> npt.NDArray[np.int64]:

@@ -68,8 +68,13 @@ def test_a_body_in_a_hole_of_another_grows() -> None:
         np.concatenate([cube.vertices, cube.vertices * 0.8]),
         np.concatenate([cube.faces, cube.faces[:, ::-1] + len(cube.vertices)]),
     )
-    filling = Object("water", cube, "glass", scale=(0.8, 0.8, 0.8))
-    assert set(grown_bodies(scene_of(filling, Object("glass", hollow, "glass")))) == {"water"}
+    filling, glass = Object("water", cube, "glass", scale=(0.8, 0.8, 0.8)), Object("glass", hollow, "glass")
+    assert set(grown_bodies(scene_of(filling, glass))) == {"water"}
+    # By more than the hole does.
+    slab = Object("slab", cube, "glass", (0, -1, 0), scale=(3, 1, 3))
+    grown = grown_bodies(scene_of(filling, glass, slab))
+    shares = [np.ptp(grown[name].world_bounds[:, 0]) / size for name, size in (("glass", 1), ("water", 0.8))]
+    assert 1 < shares[0] < shares[1] - 5e-6
 
 
 @pytest.mark.parametrize("position", [(0, 0, 0), (3, -4, 5)], ids=str)
