@@ -167,7 +167,7 @@ def test_what_a_peer_lacks_for_one_scene_is_no_matter_for_others(monkeypatch: py
     monkeypatch.setattr(compare, "Worker", Untextured)
     pool, plan = compare.Pool(1), compare.Plan(["textured", "cornell"], ["mitsuba"])
     for _ in range(2):
-        with pytest.raises(MissingPeer, match="^mitsuba on textured: ValueError: has no counterpart$"):
+        with pytest.raises(MissingPeer, match=r"^mitsuba on textured: ValueError: has no counterpart$"):
             pool.worker("mitsuba", "textured", plan.job("textured"))
         pool.worker("mitsuba", "cornell", plan.job("cornell"))
     assert pool.problem("mitsuba", "cornell") is None
