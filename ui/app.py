@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -145,9 +148,10 @@ class App:
         self.editor.attempt(lambda: self.recovery.update(self.editor.document, self.editor.now()))
 
 
-def main(file: Path | None, device: str | None) -> int:
-    """The editor on a scene file or a mesh, by default on an example; returns the exit status. Raises
-    InputError for a file or a device that is not there, DeviceError where no window opens."""
-    document = Document.example() if file is None else Document.open(file)
+def main(file: Path | None, device: str | None, options: Mapping[str, Any] = MappingProxyType({})) -> int:
+    """The editor on a scene file or a mesh, by default on an example; returns the exit status. `options` are
+    keywords of `registry.load_with_report`. Raises InputError for a file or a device that is not there,
+    DeviceError where no window opens."""
+    document = Document.example() if file is None else Document.open(file, **options)
     App(document, device, file).run()
     return 0

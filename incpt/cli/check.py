@@ -8,7 +8,14 @@ from typing import Annotated
 import typer
 
 from incpt.cli.console import complain
-from incpt.cli.options import OutsideOption, StrictOption, TimeOption
+from incpt.cli.options import (
+    OutsideOption,
+    StrictOption,
+    TimeOption,
+    UnitOption,
+    UpOption,
+    import_options,
+)
 
 
 def check(
@@ -16,12 +23,16 @@ def check(
     time: TimeOption = None,
     strict: StrictOption = False,
     allow_outside: OutsideOption = False,
+    up: UpOption = None,
+    unit: UnitOption = None,
 ) -> None:
     """Validate a scene file or a mesh, and print what is in it and what was left out."""
     from incpt.formats import registry
     from incpt.scene import summary
 
-    scene, report = registry.load_with_report(file, time=time, allow_outside=allow_outside)
+    scene, report = registry.load_with_report(
+        file, **import_options(up, unit, time=time, allow_outside=allow_outside)
+    )
     if strict:
         report.check_whole()
     for problem in summary.scene_problems(scene):

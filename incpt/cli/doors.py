@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from incpt.cli.console import complain
-from incpt.cli.options import DeviceOption
+from incpt.cli.options import DeviceOption, UnitOption, UpOption, import_options
 
 _EXTRAS = {"ui": "ui", "benchmarks": "bench"}
 PASS_ON = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
@@ -20,10 +20,13 @@ def edit(
     file: Annotated[
         Path | None, typer.Argument(help="Scene file or mesh.", show_default="an example")
     ] = None,
+    up: UpOption = None,
+    unit: UnitOption = None,
     device: DeviceOption = None,
 ) -> None:
     """The editor: select and drag things, and see the change at once."""
-    raise typer.Exit(enter("incpt.ui.app", "the editor", file, device))
+    options = import_options(up, unit)
+    raise typer.Exit(enter("incpt.ui.app", "the editor", file, device, options))
 
 
 def bench(context: typer.Context) -> None:

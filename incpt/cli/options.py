@@ -34,9 +34,28 @@ TimeOption = Annotated[
 StrictOption = Annotated[
     bool, typer.Option("--strict", help="Refuse files of which anything has to be left out.")
 ]
-OutsideOption = Annotated[
-    bool, typer.Option("--allow-outside", help="Let glTF files name files outside their own folders.")
+UpOption = Annotated[
+    str | None, typer.Option("--up", help="The axis that is up in a mesh file (OBJ, PLY, STL ...): y or z.")
 ]
+UnitOption = Annotated[
+    str | None,
+    typer.Option("--unit", help="The unit of a mesh file: mm, cm, m, km, in, ft, or a number of metres."),
+]
+OutsideOption = Annotated[
+    bool, typer.Option("--allow-outside", help="Let files name others outside their own folders.")
+]
+
+
+def import_options(up: str | None, unit: str | None, **others: Any) -> dict[str, Any]:
+    """The keywords of `registry.load_with_report` that options ask for. Raises InputError."""
+    from incpt.formats.orientation import unit_of
+
+    if unit is None:
+        return {"up": up, "unit": None, **others}
+    try:
+        return {"up": up, "unit": unit_of(unit), **others}
+    except InputError as error:
+        raise InputError(f"--{error}") from None
 
 
 def settings_from(scene: Scene, size: str | None, **given: Any) -> RenderSettings:

@@ -6,7 +6,7 @@ import os
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -20,6 +20,9 @@ from incpt.cli.options import (
     SizeOption,
     StrictOption,
     TimeOption,
+    UnitOption,
+    UpOption,
+    import_options,
     padded_pixels,
     settings_from,
 )
@@ -87,6 +90,8 @@ def render(
     fps: Annotated[float, typer.Option(help="Frames per second of a sequence.", min=1e-3)] = 24.0,
     strict: StrictOption = False,
     allow_outside: OutsideOption = False,
+    up: UpOption = None,
+    unit: UnitOption = None,
     device: DeviceOption = None,
 ) -> None:
     """Render a scene to a picture. Ctrl-C keeps what is done."""
@@ -98,10 +103,11 @@ def render(
         raise InputError(f"--aovs: {output} cannot hold them; use an .exr")
     if denoise:
         denoising.require_denoiser()
+    asked = import_options(up, unit, allow_outside=allow_outside)
     shots = [(output, time)] if frames is None else _shots(output, frames, fps, time)
     session: Session | None = None
     for path, moment in shots:
-        scene = _scene(scene_file, moment, strict, allow_outside, is_first=session is None)
+        scene = _scene(scene_file, strict, session is None, time=moment, **asked)
         scene = scene if camera is None else scene.with_active_camera(camera)
         if session is None:
             settings = settings_from(
@@ -175,14 +181,14 @@ def _shots(output: Path, frames: str, fps: float, time: float | None) -> list[tu
     return [(output.with_suffix(f".{number:04d}{output.suffix}"), number / fps) for number in numbers]
 
 
-def _scene(file: Path, time: float | None, strict: bool, allow_outside: bool, is_first: bool) -> Scene:
+def _scene(file: Path, strict: bool, is_first: bool, **options: Any) -> Scene:
     """The scene of a file. Warns, if it is the first, of a picture that shows nothing and of what is left out
     of it: once, and in short. Raises InputError for the latter where that is asked for."""
     from incpt.formats import registry
     from incpt.formats.import_report import Fate
     from incpt.scene import summary
 
-    scene, report = registry.load_with_report(file, time=time, allow_outside=allow_outside)
+    scene, report = registry.load_with_report(file, **options)
     if strict:
         report.check_whole()
     if is_first:

@@ -12,23 +12,31 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from types import NoneType
 
-from incpt.core.checks import require_bool
+from incpt.core.checks import one_of, require_bool
 from incpt.scene.checks import LARGEST, set_number
 
 
 @dataclass(frozen=True)
 class ImportOptions:
     """time            seconds into the animations of a file; None: as the file stands without them
-    allow_outside   whether a glTF file may name files outside its own folder
+    allow_outside   whether files may name others outside their own folders
+    up              the axis that is up in mesh files that do not say it, "y" or "z"; None: y
+    unit            the metres of their unit; None: one
     """
 
     time: float | None = None
     allow_outside: bool = False
+    up: str | None = None
+    unit: float | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.time, NoneType):
             set_number(self, "time", 0.0, LARGEST)
         require_bool("allow_outside", self.allow_outside)
+        if self.up is not None:
+            one_of("up", self.up, ("y", "z"))
+        if self.unit is not None:
+            set_number(self, "unit", 1e-6, LARGEST)
 
 
 _DEFAULT = ImportOptions()

@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from incpt.core.errors import in_place
-from incpt.formats import images, mesh_files
+from incpt.formats import images, mesh_files, registry
+from incpt.formats.orientation import upright
+from incpt.formats.registry import FileKind
 from incpt.scene.camera import Camera
 from incpt.scene.edits import unique_name
 from incpt.scene.environment import Environment
@@ -24,10 +26,12 @@ def scene_around(path: Path) -> Scene:
     are. Without a camera one frames them from the front right and above; without a light they stand in a
     studio. Raises InputError."""
     file = mesh_files.load_file(path)
+    row = registry.format_of(path, FileKind.MESH)
     with in_place(str(path)):
+        parts = upright(file.parts, says_units=row is not None and row.says_units)
         materials: dict[str, Material] = {}
         objects = []
-        for part in file.parts:
+        for part in parts:
             material_name, material = part.material_name or "grey", part.material or Material(roughness=0.6)
             materials.setdefault(material_name, material)
             name = path.stem if part.name is None else f"{path.stem}/{part.name}"

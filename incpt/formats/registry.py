@@ -40,13 +40,15 @@ class Format:
 
     `reader` is the module in this folder and the function in it that takes the path of a readable file and
     returns what the kind says; what it raises as InputError does not name the file, which `read` does.
-    `needs` are modules that the reader uses and an installation may lack.
+    `needs` are modules that the reader uses and an installation may lack. `says_units`: such files say where
+    up is and what their unit is.
     """
 
     suffix: str
     kind: FileKind
     reader: tuple[str, str]
     needs: tuple[str, ...] = ()
+    says_units: bool = False
 
     @property
     def is_available(self) -> bool:
@@ -69,15 +71,15 @@ FORMATS = (
     Format(".toml", FileKind.SCENE, ("scene_toml", "load_scene_toml")),
     OPENEXR,
     *(Format(suffix, FileKind.IMAGE, ("images", "read_other")) for suffix in _OTHER_IMAGES),
-    Format(".glb", FileKind.MESH, _GLTF),
-    Format(".gltf", FileKind.MESH, _GLTF),
+    Format(".glb", FileKind.MESH, _GLTF, says_units=True),
+    Format(".gltf", FileKind.MESH, _GLTF, says_units=True),
     Format(".obj", FileKind.MESH, ("obj.reader", "read_obj")),
     Format(".off", FileKind.MESH, _TRIMESH),
     Format(".ply", FileKind.MESH, _TRIMESH),
     Format(".stl", FileKind.MESH, _TRIMESH),
     Format(".3mf", FileKind.MESH, _TRIMESH, needs=("lxml", "networkx")),
     Format(".dae", FileKind.MESH, _TRIMESH, needs=("collada",)),
-    Format(".npz", FileKind.MESH, ("mesh_store", "read_stored")),
+    Format(".npz", FileKind.MESH, ("mesh_store", "read_stored"), says_units=True),
 )
 """All formats, in the order in which messages list them."""
 
@@ -99,14 +101,22 @@ def format_of(path: str | os.PathLike[str], *kinds: FileKind) -> Format | None:
     return next(rows, None)
 
 
-def load(path: str | os.PathLike[str], *, time: float | None = None, allow_outside: bool = False) -> Scene:
+def load(
+    path: str | os.PathLike[str],
+    *,
+    time: float | None = None,
+    allow_outside: bool = False,
+    up: str | None = None,
+    unit: float | None = None,
+) -> Scene:
     """A scene from a scene file (.toml), or a default scene around a mesh file.
 
     `time`: seconds into the animations of its files; None leaves them out. `allow_outside`: a glTF file may
-    name files outside its own folder. InputWarnings tell of all that was left out, and of a scene that shows
-    nothing. Raises InputError, one line that names file, table and key.
+    name files outside its own folder. `up` ("y" or "z") and `unit` (metres) say how a mesh file is meant
+    whose format does not say it (OBJ, PLY, STL ...). InputWarnings tell of all that was left out, and of a
+    scene that shows nothing. Raises InputError, one line that names file, table and key.
     """
-    scene, report = load_with_report(path, time=time, allow_outside=allow_outside)
+    scene, report = load_with_report(path, time=time, allow_outside=allow_outside, up=up, unit=unit)
     for complaint in complaints(path, scene, report):
         warnings.warn(complaint, InputWarning, stacklevel=2)
     return scene
@@ -120,11 +130,16 @@ def complaints(path: str | os.PathLike[str], scene: Scene, report: ImportReport)
 
 
 def load_with_report(
-    path: str | os.PathLike[str], *, time: float | None = None, allow_outside: bool = False
+    path: str | os.PathLike[str],
+    *,
+    time: float | None = None,
+    allow_outside: bool = False,
+    up: str | None = None,
+    unit: float | None = None,
 ) -> tuple[Scene, ImportReport]:
     """A scene as `load` gives it, and what became of its files: nothing is warned of. Raises InputError."""
     path = path_of("path", path)
-    options = ImportOptions(time, allow_outside)
+    options = ImportOptions(time, allow_outside, up, unit)
     check_readable(path)
     row = format_of(path, FileKind.SCENE, FileKind.MESH)
     if row is None:
@@ -134,6 +149,11 @@ def load_with_report(
         )
     with import_report.gathered() as found, reading_with(options):
         if row.kind is FileKind.SCENE:
+            if (up, unit) != (None, None):
+                name = "unit" if up is None else "up"
+                raise InputError(
+                    f"{name}: {path} is a scene, whose y is up and whose unit is the metre; leave it out"
+                )
             scene: Scene = row.read(path)
         else:
             # It reads meshes by the table above.

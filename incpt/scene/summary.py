@@ -123,4 +123,5 @@ def _described_camera(camera: Camera, size: tuple[int, int]) -> str:
 
 
 def _described_point(point: Collection[float]) -> str:
-    return "(" + ", ".join(f"{x:.4g}" for x in point) + ")"
+    # What turning leaves of a 0 is none that anybody wants to read.
+    return "(" + ", ".join(f"{round(x, 12) + 0.0:.4g}" for x in point) + ")"

@@ -112,4 +112,4 @@ def reset_transform(editor: Editor) -> None:
     scene = editor.scene
     for name in editor.selection.names:
         scene = scene.with_placed(name, transform=IDENTITY)
-    editor.propose(scene, "Reset transform")
+    editor.propose(scene, "Clear all three")

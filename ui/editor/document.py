@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from incpt.core.errors import InputError, InputWarning, one_line
 from incpt.formats import registry, scene_save
@@ -66,10 +67,11 @@ class Document:
         return cls(scene, warnings=tuple(messages))
 
     @classmethod
-    def open(cls, path: str | os.PathLike[str]) -> Document:
-        """A document from a scene file, or an untitled one around a mesh file. Raises InputError."""
+    def open(cls, path: str | os.PathLike[str], **options: Any) -> Document:
+        """A document from a scene file, or an untitled one around a mesh file. `options` are those of
+        `registry.load_with_report`. Raises InputError."""
         absolute = absolute_path(path)
-        scene, report = registry.load_with_report(absolute)
+        scene, report = registry.load_with_report(absolute, **options)
         warnings = tuple(map(one_line, registry.complaints(absolute, scene, report)))
         is_scene = absolute.suffix.lower() == SUFFIX
         name = absolute.name if is_scene else absolute.stem

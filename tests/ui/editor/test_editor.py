@@ -280,7 +280,7 @@ def test_another_document_starts_over(user: Desk) -> None:
 
 NAMES = [o.name for o in SCENE.objects] + ["cube", "red cube.001", "lamp.001"]
 COMMANDS = [
-    "Duplicate", "Delete", "Hide", "Show all", "Select all", "Select none", "Reset transform", "Cube",
+    "Duplicate", "Delete", "Hide", "Show all", "Select all", "Select none", "Clear all three", "Cube",
     "Frame selected", "Reset camera", "Front", "Match window", "Local axes", "Tile grid", "Pause", "Depth",
 ]  # fmt: skip
 steps = st.one_of(

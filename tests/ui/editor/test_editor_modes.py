@@ -203,7 +203,7 @@ AFTER: dict[str, tuple[Callable[[Desk], object], Mode]] = {
     ),
     "delete": (command("Delete"), INCREMENTAL),
     "hide": (command("Hide"), INCREMENTAL),
-    "reset transform": (command("Reset transform"), INCREMENTAL),
+    "clear transform": (command("Clear all three"), INCREMENTAL),
     # What no pixel shows.
     "exposure": (typed("Method", "Exposure", "2"), REFINE),
     "curve": (chosen("Method", "Curve", "Filmic"), REFINE),

@@ -146,7 +146,7 @@ def test_lights_are_added_copied_and_deleted(user: Desk) -> None:
     assert not user.scene.light("point").visible and not user.scene.object("red cube").visible
     user.run("Show all")
     assert user.scene.light("point").visible
-    user.run("Reset transform")
+    user.run("Clear all three")
     assert user.scene.light("point").position == (0, 0, 0)
     user.run("Select all")
     assert set(user.editor.selection.names) == user.scene.names
