@@ -1,6 +1,6 @@
 """Rewrites the tables that documents quote from benchmarks/results/, so that they cannot say anything else.
 
-    python -m incpt.benchmarks.quoted            rewrite README.md and benchmarks/README.md
+    python -m incpt.benchmarks.quoted            rewrite benchmarks/README.md and docs/method.md
     python -m incpt.benchmarks.quoted --check    exit status 1 where they disagree
 
 A quoted table stands between two comments; what is between them is replaced. The first names a file of
@@ -26,7 +26,7 @@ from incpt.core.errors import InputError, in_place
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results"
-DOCUMENTS = (ROOT / "README.md", ROOT / "benchmarks" / "README.md")
+DOCUMENTS = (ROOT / "benchmarks" / "README.md", ROOT / "docs" / "method.md")
 
 _QUOTE = re.compile(r"(<!-- quoted: ([\w./-]+)(?: (\d+))? -->\n)(.*?)(<!-- end of quote -->)", re.DOTALL)
 

@@ -1,0 +1,36 @@
+"""Which files can be read."""
+
+from __future__ import annotations
+
+from incpt.formats import bitmaps, registry
+from incpt.formats.registry import FileKind
+from reference.markdown import code, table
+
+_READERS = {
+    "gltf.reader": "glTF 2.0, by a reader of our own",
+    "obj.reader": "OBJ with MTL, by a reader of our own",
+    "trimesh_adapter": "by trimesh",
+    "mesh_store": "meshes that incpt itself writes beside a scene file",
+    "images": "environments and, in scene files, textures",
+    "scene_toml": "[scene files](scene-file.md)",
+}
+_NEEDS = {"collada": "pycollada"}
+"""Distributions by their modules, where the names differ."""
+
+
+def readable() -> str:
+    """Every suffix, what such files are, and what has to be installed for them."""
+    rows = []
+    for kind in FileKind:
+        for row in (row for row in registry.FORMATS if row.kind is kind):
+            needs = ", ".join(code(_NEEDS.get(name, name)) for name in row.needs)
+            rows.append((code(row.suffix), kind.value, _READERS[row.reader[0]], needs or "–"))
+    return table(("suffix", "holds", "read as", "needs as well"), rows)
+
+
+def textures() -> str:
+    """The suffixes that are offered as textures."""
+    return ", ".join(map(code, bitmaps.SUFFIXES))
+
+
+PIECES = {"formats": readable, "texture formats": textures}
