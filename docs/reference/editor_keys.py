@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import partial
 
 from incpt.ui import bindings
@@ -42,7 +42,7 @@ def menus() -> str:
     return table(("menu", "command", "what it does"), rows)
 
 
-PIECES = {
+PIECES: dict[str, Callable[[], str]] = {
     "menus": menus,
     "keys of transforms": modal,
     **{f"{name} {which}": partial(make, which) for which in ("blender", "plain")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from incpt.formats import bitmaps, registry
 from incpt.formats.registry import FileKind
 from reference.markdown import code, table
@@ -33,4 +35,4 @@ def textures() -> str:
     return ", ".join(map(code, bitmaps.SUFFIXES))
 
 
-PIECES = {"formats": readable, "texture formats": textures}
+PIECES: dict[str, Callable[[], str]] = {"formats": readable, "texture formats": textures}

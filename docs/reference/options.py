@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -64,7 +65,7 @@ def _sentence(text: str) -> str:
 
 OPTIONS = tuple(name for name in commands_of(app) if name != "bench")
 """The commands whose options are told; those of the benchmarks tell theirs themselves."""
-PIECES = {
+PIECES: dict[str, Callable[[], str]] = {
     "commands": commands,
     "benchmarks": benchmarks,
     **{f"options {name}": partial(options, name) for name in OPTIONS},

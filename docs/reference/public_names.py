@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from enum import Enum
+from functools import cached_property
 from typing import Any
 
 import incpt
@@ -26,7 +27,7 @@ def _described(name: str, value: Any) -> str:
     if inspect.isclass(value):
         if issubclass(value, Enum):
             lines.append(", ".join(f"`{member}`" for member in value))
-        head = "" if _is_made_by_incpt(value) else _signature(name, value) + "\n\n"
+        head = "" if _is_never_called(value) else _signature(name, value) + "\n\n"
         lines.append(_block(head + inspect.cleandoc(value.__doc__ or "")))
         members = [f"{head}\n{_indented(text)}" if text else head for head, text in _members(value)]
         lines += [_block("\n\n".join(members))] if members else []
@@ -35,24 +36,24 @@ def _described(name: str, value: Any) -> str:
     return "\n\n".join(lines)
 
 
-def _is_made_by_incpt(value: type) -> bool:
-    """Whether nobody calls the class: enumerations and exceptions."""
+def _is_never_called(value: type) -> bool:
+    """Whether the class is an enumeration or an exception."""
     return issubclass(value, (Enum, BaseException))
 
 
 def _members(value: type) -> Iterator[tuple[str, str]]:
-    """Head and docstring of each public method and documented property that the class itself defines."""
+    """Head and docstring of each public method and property that the class itself defines."""
     for name, member in vars(value).items():
         if name.startswith("_"):
             continue
-        if isinstance(member, (property,)) or hasattr(member, "func"):
-            text = inspect.getdoc(member)
-            if text:
-                yield name, text
+        text = inspect.getdoc(member) or ""
+        if isinstance(member, property | cached_property):
+            function: Any = member.fget if isinstance(member, property) else member.func
+            yield f"{name}: {inspect.signature(function).return_annotation}", text
         elif isinstance(member, classmethod | staticmethod):
-            yield _signature(f"{value.__name__}.{name}", getattr(value, name)), inspect.getdoc(member) or ""
+            yield _signature(f"{value.__name__}.{name}", getattr(value, name)), text
         elif inspect.isfunction(member):
-            yield _signature(name, member, is_method=True), inspect.getdoc(member) or ""
+            yield _signature(name, member, is_method=True), text
 
 
 def _signature(name: str, function: Any, is_method: bool = False) -> str:
@@ -74,7 +75,7 @@ def _words(parameters: list[inspect.Parameter]) -> Iterator[str]:
     for index, one in enumerate(parameters):
         if one.kind is one.KEYWORD_ONLY and not {one.kind, one.VAR_POSITIONAL} & {*kinds[:index]}:
             yield "*"
-        star = {one.VAR_POSITIONAL: "*", one.VAR_KEYWORD: "**"}.get(one.kind, "")
+        star = "*" if one.kind is one.VAR_POSITIONAL else "**" if one.kind is one.VAR_KEYWORD else ""
         default = "" if one.default is one.empty else f" = {_default(one.default)}"
         yield f"{star}{one.name}: {one.annotation}{default}"
         is_last = index + 1 == len(parameters) or kinds[index + 1] is not one.POSITIONAL_ONLY
@@ -97,4 +98,4 @@ def _block(text: str) -> str:
     return f"```text\n{text}\n```"
 
 
-PIECES = {"public names": names}
+PIECES: dict[str, Callable[[], str]] = {"public names": names}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any
 
@@ -82,7 +82,7 @@ def _span(refusal: str) -> str:
 
 
 def _rows(
-    keys: Iterable[str], make: Callable[..., Any], default_of: Callable[[str], Any], told: dict[str, str]
+    keys: Iterable[str], make: Callable[..., Any], default_of: Callable[[str], Any], told: Mapping[str, str]
 ) -> Iterable[tuple[str, ...]]:
     for key in keys:
         value, default = meanings.VALUES.get((key, default_of(key))), default_of(key)
@@ -91,7 +91,7 @@ def _rows(
         yield code(key), value, "–" if default is None else toml(default), told[key]
 
 
-def _table(keys: Iterable[str], make: Callable[..., Any], default: Any, told: dict[str, str]) -> str:
+def _table(keys: Iterable[str], make: Callable[..., Any], default: Any, told: Mapping[str, str]) -> str:
     return table(_HEADINGS, _rows(keys, make, partial(getattr, default), told))
 
 
@@ -185,15 +185,15 @@ def shapes() -> str:
     return ", ".join(toml(name) for name in SHAPES)
 
 
-def _explained(keys: Iterable[str], told: dict[str, str]) -> Iterable[tuple[str, str]]:
+def _explained(keys: Iterable[str], told: Mapping[str, str]) -> Iterable[tuple[str, str]]:
     return ((code(key), told[key]) for key in keys)
 
 
-def _placed(keys: Iterable[str], told: dict[str, tuple[str, ...]]) -> Iterable[tuple[str, ...]]:
+def _placed(keys: Iterable[str], told: Mapping[str, tuple[str, ...]]) -> Iterable[tuple[str, ...]]:
     return ((code(key), *told[key]) for key in keys)
 
 
-PIECES = {
+PIECES: dict[str, Callable[[], str]] = {
     "scene file": file, "camera": camera, "environment": environment, "sky": sky, "render": render,
     "material": material, "texture": texture, "objects": objects, "lights": lights,
     "kinds of lights": light_kinds, "shapes": shapes, "edit script": edits_file, "edit": edit,
