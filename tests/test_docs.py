@@ -31,6 +31,7 @@ ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 PAGES = pages.pages()
 LINKED = [*PAGES, ROOT / "README.md"]
+PIECE = re.compile(r"<!-- from the program: .*?<!-- end -->", re.DOTALL)
 BLOCK = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)
 
 
@@ -258,6 +259,16 @@ def said() -> str:
             elif isinstance(node, ast.Constant) and isinstance(node.value, str):
                 found.append(node.value)
     return "\n".join(found)
+
+
+def test_labels_of_the_editor_are_its_own() -> None:
+    text = " ".join(PIECE.sub("", (DOCS / "editor.md").read_text("utf-8")).split())
+    found = {label for bold in re.findall(r"\*\*(.+?)\*\*", text) for label in re.split(r" › | \+ ", bold)}
+    # Names of menus stand before a slash, those that imgui tells widgets apart by behind two signs.
+    texts = {part for text in said().splitlines() for part in re.split("/|##", text)}
+    known = texts | {text.capitalize() for text in texts}
+    assert len(found) > 50
+    assert {label for label in found if label not in known and len(label) > 1} == set()
 
 
 def test_lines_that_are_explained_are_said() -> None:
