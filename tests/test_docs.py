@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import os
 import re
+import shlex
 import sys
 import tomllib
 from collections.abc import Iterator
@@ -187,6 +188,33 @@ def test_examples_of_files_are_read(block: str, tmp_path: Path) -> None:
         return
     path.write_text(block if "version =" in block else f"version = {scene_toml.VERSION}\n{block}", "utf-8")
     assert scene_toml.load_scene_toml(path).cameras
+
+
+def typed() -> Iterator[list[str]]:
+    """The words of every command of incpt in the blocks for a shell."""
+    for page in LINKED:
+        for line in "\n".join(blocks(page.read_text("utf-8"), "sh")).splitlines():
+            words = [word for word in shlex.split(line, comments=True) if "=" not in word]
+            if words and words[0] in ("incpt", "./run"):
+                yield words
+
+
+def test_commands_that_are_shown_can_be_typed() -> None:
+    known, own = options.commands_of(options.app), (ROOT / "run").read_text("utf-8")
+    benches = options.commands_of(bench_app)
+    found = list(typed())
+    assert len(found) > 20
+    for words in found:
+        program, name, *rest = words
+        if program == "./run" and name not in known:
+            assert re.search(rf"^    {name}\)$", own, re.MULTILINE), words
+            continue
+        if name == "bench":
+            assert not rest or rest[0] in benches, words
+        parameters = benches[rest[0]].params if name == "bench" and rest else known[name].params
+        allowed = {option for parameter in parameters for option in parameter.opts}
+        assert {word for word in rest if word.startswith("-")} <= allowed, words
+        assert all((ROOT / word).is_file() for word in rest if word.startswith("scenes/")), words
 
 
 # ---------------------------------------------------------------------------------------- links and lines
