@@ -51,7 +51,7 @@ class Material:
     degrees, counter-clockwise), and in the colours of a film of `iridescence_ior` and
     `iridescence_thickness` nm as far as `iridescence` says; then `sheen_color`, the fuzz of cloth; then
     `clearcoat`, a colourless lacquer with an index of refraction of 1.5. Each lets through what it does not
-    reflect. Sheen, clearcoat, anisotropy and film belong to what is not transmissive.
+    reflect. Sheen, clearcoat and anisotropy belong to what is not transmissive; a film lies on glass too.
 
     Where a material is transmissive it is a body, which absorbs and refracts, or with `thin_walled` a wall
     without a thickness, which does neither: light goes straight on behind it. `dispersion` is 20 over Abbe's
