@@ -52,7 +52,8 @@ def _default(parameter: Any) -> str:
         return parameter.show_default
     if parameter.default is None or parameter.default is False:
         return "–"
-    return code(f"{parameter.default:g}")
+    is_number = isinstance(parameter.default, float)
+    return code(f"{parameter.default:g}" if is_number else parameter.default)
 
 
 def _first(text: str) -> str:
