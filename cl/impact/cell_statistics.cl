@@ -204,6 +204,9 @@ __kernel void find_spans(PICTURE_PARAMETERS, CELLS_PARAMETERS, SPANS_PARAMETERS)
         }
     const int from = MAX((first - around) * (int)CELL_SIZE, (int)patch.left);
     const int to = MIN((last + around + 1) * (int)CELL_SIZE, (int)patch.right);
-    spans[2u * patch.index] = last < 0 ? (uint)patch.right : (uint)from;
-    spans[2u * patch.index + 1u] = last < 0 ? (uint)patch.right : (uint)to;
+    __global uint *span = spans + 4u * patch.index;
+    span[2] = span[0];
+    span[3] = span[1];
+    span[0] = last < 0 ? (uint)patch.right : (uint)from;
+    span[1] = last < 0 ? (uint)patch.right : (uint)to;
 }

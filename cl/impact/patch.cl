@@ -59,7 +59,13 @@ INLINE Patch narrowed(const Patch *patch, size_t left, size_t right) {
 // What of a patch is near a change; `spans` has its first column and the one behind its last.
 INLINE Patch near_change(const Patch *patch, uint height, __global const uint *spans) {
     const uint index = patch->top < height ? patch->index : 0u;
-    return narrowed(patch, spans[2u * index], spans[2u * index + 1u]);
+    return narrowed(patch, spans[4u * index], spans[4u * index + 1u]);
+}
+
+// What of a patch was near a change when the picture was made before; no columns if it never was made.
+INLINE Patch was_near_change(const Patch *patch, uint height, __global const uint *spans) {
+    const uint index = patch->top < height ? patch->index : 0u;
+    return narrowed(patch, spans[4u * index + 2u], spans[4u * index + 3u]);
 }
 
 // Planes with a margin, in which kernels look around without asking where the picture ends: floats from one

@@ -46,7 +46,8 @@ INLINE Vec3 change_of(const Half *samples_of, float per_sample, float per_pair, 
 }
 
 __kernel WIDE void split_change(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PARAMETERS, CELLS_PARAMETERS,
-                                SPANS_PARAMETERS, COLUMN_RULES_PARAMETERS, HALVES_PARAMETERS, BASE_PARAMETERS,
+                                SPANS_PARAMETERS, COLUMN_RULES_PARAMETERS, HALVES_PARAMETERS,
+                                SMOOTH_HALVES_PARAMETERS, EVIDENCE_PARAMETERS, BASE_PARAMETERS,
                                 SHOWN_IMAGE_PARAMETERS) {
     const Patch patch = patch_of(width, height, CELL_SIZE);
     const size_t pixels = (size_t)width * height, size = field_size(width, height);
@@ -61,6 +62,24 @@ __kernel WIDE void split_change(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PAR
             const Anchor anchor = load_anchor(anchor_sums, pixels, pixel);
             const Vec3 light = add(anchor.radiance, refinement_of(&p, &anchor));
             store_pixel(shown_image, pixel, light, anchor.samples + sample_count(&p) > 0.0f);
+        }
+    }
+    // Pixels near a change look around at those that are not. Where a picture before had a change near and
+    // this one does not, what it left there must not be found.
+    const Patch was_near = was_near_change(&patch, height, spans);
+    for (int side = 0; side < 2; side++) {
+        const Patch left_behind = narrowed(&patch, side ? MAX(was_near.left, near.right) : was_near.left,
+                                           side ? was_near.right : MIN(was_near.right, near.left));
+        EACH_ROW(y, left_behind)
+        EACH_COLUMN(x, left_behind) {
+            const size_t place = field_place(width, x, y);
+            halves[HALF_WEIGHT_0 * size + place] = 0.0f;
+            halves[HALF_WEIGHT_1 * size + place] = 0.0f;
+            smooth_halves[HALF_WEIGHT_0 * size + place] = 0.0f;
+            smooth_halves[HALF_WEIGHT_1 * size + place] = 0.0f;
+#pragma unroll
+            for (size_t i = 0u; i < EVIDENCE_PLANES * LOCAL_SCALES; i++)
+                evidence[i * size + place] = 0.0f;
         }
     }
     const size_t rule_size = (size_t)width * cell_rows(height);

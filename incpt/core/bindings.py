@@ -342,7 +342,9 @@ SPANS = Group(
     None,
     (
         Argument(
-            "spans", "__global uint *", "the columns of each patch near which anything changes: from, to"
+            "spans",
+            "__global uint *",
+            "columns of each patch near which anything changes: from, to; and those of the picture before",
         ),
     ),
 )
@@ -525,7 +527,10 @@ KERNELS: dict[str, tuple[Group, ...]] = {
         *(PICTURE, PAIRS, LABELS, CELLS, RULES, SLOPES, SHOWN_IMAGE, SHOWN_SHARES, TILE_COLUMNS),
     ),
     "sum_columns": (COLUMN_SUMS,),
-    "split_change": (PICTURE, PAIRS, LABELS, CELLS, SPANS, COLUMN_RULES, HALVES, BASE, SHOWN_IMAGE),
+    "split_change": (
+        *(PICTURE, PAIRS, LABELS, CELLS, SPANS, COLUMN_RULES),
+        *(HALVES, SMOOTH_HALVES, EVIDENCE, BASE, SHOWN_IMAGE),
+    ),
     "smooth_change": (
         *(PICTURE, LABELS, GUIDES, SPANS, SCALE, HALVES, SMOOTH_HALVES, DETAILS, EVIDENCE, CELL_EVIDENCE),
     ),

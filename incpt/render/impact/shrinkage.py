@@ -97,7 +97,7 @@ class Shrinkage:
 
     def _run(self, patches: Patches, values: Mapping[str, Any]) -> None:
         fine, coarse = self._halves
-        patches.launch("split_change", _FILE, {**values, "halves": fine})
+        patches.launch("split_change", _FILE, {**values, "halves": fine, "smooth_halves": coarse})
         for scale in range(layout.SMOOTHING_SCALES):
             own = {**values, "scale_index": scale, "halves": fine, "smooth_halves": coarse}
             features = ("LAST_SCALE",) if scale == layout.SMOOTHING_SCALES - 1 else ()

@@ -36,7 +36,8 @@ class Statistics:
 
     cells         layout.CellPlane of each class, a float for each cell.
     column_rules  what follows for pixels: layout.RulePlane, each for each class, interpolated along rows.
-    spans         of each patch the columns near which anything changes: the first, and that behind the last.
+    spans         of each patch the columns near which anything changes: the first, and that behind
+                  the last; and the same of the update before.
     """
 
     def __init__(self, device: Device, width: int, height: int) -> None:
@@ -47,7 +48,8 @@ class Statistics:
 
         self.cells = planes(layout.CLASSES * len(layout.CellPlane))
         self.column_rules = device.empty(4 * _RULES * width * patches.cell_rows)
-        self.spans = device.empty(8 * patches.count)
+        self.spans = device.empty(16 * patches.count)
+        device.fill(self.spans, 0, 16 * patches.count)
         self._rules = planes(_RULES)
         self._cell_sums = planes(layout.CLASSES * len(layout.CellSum))
         self._slopes = device.upload(squared_slopes())

@@ -95,6 +95,28 @@ def test_where_no_path_met_a_change_the_old_picture_is_refined_and_no_more(devic
     assert np.abs(shown - refined)[:, :100].max() > 0.1
 
 
+@pytest.mark.parametrize("place", [(20, 20), (100, 150), (180, 290)], ids=str)
+def test_a_large_change_before_a_small_one_leaves_nothing(device: Device, place: tuple[int, int]) -> None:
+    """The planes that pictures are made in are those of the picture before, and what it had far from what
+    changes now must not show at the borders of that."""
+    width, height = 300, 200
+    edit, large = sampled(width, height, 3)
+    large.touched[:] = 1
+    large.new[:] += 5 * large.samples[..., None]
+    _, small = sampled(width, height, 3, seed=1)
+    small.touched[:] = 0
+    small.touched[place] = 1
+    small.new[:] = small.old
+    edit.guides.changed[:] = False
+    rig, fresh = Rig(device, width, height), Rig(device, width, height)
+    rig.load(large, edit.guides)
+    rig.picture()
+    for one in (rig, fresh):
+        one.load(small, edit.guides)
+    np.testing.assert_array_equal(rig.picture(), fresh.picture())
+    np.testing.assert_array_equal(rig.picture(), fresh.picture())
+
+
 def test_without_pairs_the_picture_is_the_kept_one(device: Device) -> None:
     edit, state = sampled(70, 45, 0)
     rig = Rig(device, 70, 45)

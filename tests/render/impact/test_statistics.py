@@ -233,10 +233,14 @@ def test_spans_reach_from_the_first_to_the_last_change_nearby(device: Device) ->
     )
     rig.statistics.update(rig.film, rig.guides)
     rows = -(-height // CELL_SIZE)
-    spans = device.read(rig.statistics.spans, np.empty((rows, 3, 2), np.uint32)).astype(int)
+    spans = device.read(rig.statistics.spans, np.empty((rows, 3, 4), np.uint32)).astype(int)
     ends = np.array([PATCH_WIDTH, 2 * PATCH_WIDTH, width])
     expected = np.repeat(ends[None, :, None], rows, 0).repeat(2, 2)
     # Four cells to each side of the one with a change; what lies in the next patch is another's.
     expected[:5, 1] = (37 - 4) * CELL_SIZE, (37 + 5) * CELL_SIZE
     expected[rows - 5 :, 0] = (5 - 4) * CELL_SIZE, (11 + 5) * CELL_SIZE
-    np.testing.assert_array_equal(spans, expected)
+    np.testing.assert_array_equal(spans[..., :2], expected)
+    np.testing.assert_array_equal(spans[..., 2:], 0)  # there was no picture before
+    rig.statistics.update(rig.film, rig.guides)
+    spans = device.read(rig.statistics.spans, np.empty((rows, 3, 4), np.uint32)).astype(int)
+    np.testing.assert_array_equal(spans[..., 2:], expected)
