@@ -144,3 +144,9 @@ def tell(*remarks: Remark) -> None:
     for remark in remarks:
         if remark.fate is Fate.LEFT_OUT:
             warnings.warn(str(remark), InputWarning, stacklevel=3)
+
+
+def counted(count: int, what: str) -> str:
+    """ "1 mesh", "2 meshes": a number with its noun, as remarks have it."""
+    plural = f"{what}es" if what.endswith("sh") else f"{what}s"
+    return f"{count:,} {what if count == 1 else plural}"

@@ -276,7 +276,7 @@ def test_a_polygon_becomes_a_fan(tmp_path: Path) -> None:
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no usable face"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 1 2\n", "no usable face .1 with zero area"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "no usable face .1 with an index out of range"),
-        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf a b c\n", "is no OBJ mesh"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf a b c\n", "has no usable face"),
         ("a.obj", b"v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "no usable face .1 with a vertex that is not finite"),
         ("a.obj", b"v zero one two\nf 1 1 1\n", "no usable face .1 with a vertex that is not finite"),
         ("a.obj", b"\x89PNG\r\n\x1a\n\x00\x00", "is no OBJ mesh, or a damaged one"),

@@ -181,10 +181,36 @@ def test_what_has_no_area_is_told(tmp_path: Path) -> None:
     )
     assert told(path) == [
         "1 materials: the file names no file of materials",
-        "1 lines: have no area",
-        "1 points: have no area",
+        "1 line without area",
+        "1 point without area",
         "curves and surfaces: only polygons are read; export them as polygons",
-        "1 lines with 'teapot': the keyword is not known",
+        "1 line with 'teapot': the keyword is not known",
+    ]
+
+
+def test_corners_that_are_no_indices_lose_their_faces(tmp_path: Path) -> None:
+    path = written(tmp_path, f"{SQUARE}f 1 2 3\nf foo bar 3\nf 1 3 4 1/2.5\nf 1 3 4\n")
+    assert told(path) == [
+        "3 of 5 faces: 3 with an index out of range",
+        "faces at a corner 'foo' and 2 more: it is no index",
+    ]
+    assert mesh_files.load_mesh(path).faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+    with pytest.raises(InputError, match="has no usable face"):
+        mesh_files.load_file(written(tmp_path, f"{SQUARE}f a b c\n", name="none.obj"))
+
+
+def test_what_corners_name_and_the_file_does_not_have_is_told(tmp_path: Path) -> None:
+    path = written(
+        tmp_path, f"{SQUARE}vt 0 0\nvt nan 1\nvn 0 0 1\nvn 0 nan 0\nvn 0 0 0\nf 1/9/1 2/1/-7 3/-3/2\n"
+    )
+    assert told(path) == [
+        "texture coordinates of 2 corners: are not in the file",
+        "normals of 1 corner: are not in the file",
+    ]
+    assert told(path, Fate.READ) == ["1 object"]
+    assert told(path, Fate.CHANGED) == [
+        "2 normals: without direction, for which faces have their own",
+        "1 pair of texture coordinates: no numbers, which count as 0",
     ]
 
 

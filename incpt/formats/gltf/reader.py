@@ -29,6 +29,7 @@ from incpt.formats.gltf.nodes import Node, Nodes, instances
 from incpt.formats.gltf.table import Table
 from incpt.formats.gltf.textures import Textures
 from incpt.formats.import_options import current_options
+from incpt.formats.import_report import counted
 from incpt.formats.placement import placed_arrays
 from incpt.scene.camera import Camera
 from incpt.scene.mesh import Mesh, MeshSource
@@ -66,13 +67,8 @@ def read_gltf(path: Path) -> MeshFile:
     _tell_of_variants(document)
     meshes = len({id(part.mesh) for part in parts})
     counts = {"object": len(parts), "mesh": meshes, "light": len(lights), "camera": len(cameras)}
-    import_report.read(", ".join(_counted(count, what) for what, count in counts.items() if count))
+    import_report.read(", ".join(counted(count, what) for what, count in counts.items() if count))
     return MeshFile(parts, lights, cameras, tuple(document.files))
-
-
-def _counted(count: int, what: str) -> str:
-    plural = f"{what}es" if what.endswith("sh") else f"{what}s"
-    return f"{count:,} {what if count == 1 else plural}"
 
 
 def _tell_of_variants(document: Document) -> None:

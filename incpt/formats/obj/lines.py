@@ -80,6 +80,10 @@ class ObjText:
     points: int = 0
     curves: int = 0
     unknown: dict[str, int] = field(default_factory=dict)
+    unreadable: list[str] = field(default_factory=list)
+    """Corners of faces that are no indices."""
+    out_of_range: dict[str, int] = field(default_factory=dict)
+    """How many corners of faces name texture coordinates, and normals, that the file does not have so far."""
 
 
 def decoded(content: bytes) -> bytes:
@@ -126,7 +130,8 @@ def read_text(content: bytes) -> ObjText:
             rows[key].append(_fitted(numbers, _WIDTHS[key]))
             totals[key] += lines
         elif key in (b"f", b"fo"):
-            found.runs.append(FaceRun(state, *_faces(piece, lines, np.array(list(totals.values())))))
+            sizes, corners = _faces(found, piece, lines, np.array(list(totals.values())))
+            found.runs.append(FaceRun(state, sizes, corners))
         else:
             state = _said(found, state, key, piece.strip().decode("utf-8", "replace"))
     found.vertices, found.uvs, found.normals = (
@@ -150,7 +155,8 @@ def _pieces(content: bytes) -> Iterator[tuple[bytes, bytes, int]]:
         text = content[starts[first] : ends[last - 1]]
         if kinds[first] < len(_FREQUENT):
             key = _FREQUENT[kinds[first]]
-            yield key, text.replace(key, b" "), last - first
+            blank = b" " * len(key)
+            yield key, blank + text[len(key) :].replace(b"\n" + key, b"\n" + blank), last - first
             continue
         for line in text.split(b"\n"):
             words = line.split(None, 1)
@@ -254,19 +260,25 @@ def _colors_of(numbers: Array) -> Array:
     return colors
 
 
-def _faces(piece: bytes, lines: int, totals: Indices) -> tuple[Indices, Corners]:
+def _faces(found: ObjText, piece: bytes, lines: int, totals: Indices) -> tuple[Indices, Corners]:
     """Sizes and corners of faces, see FaceRun, where there are `totals` of each kind of vertex so far."""
     sizes = _words_in_lines(piece, lines)
-    written = _corners(piece, int(sizes.sum()))
+    written = _corners(piece, int(sizes.sum()), found.unreadable)
     corners = np.where(written > 0, written - 1, written + totals)
-    corners[(written == 0) | (corners < 0) | (corners >= totals)] = NOWHERE
+    outside = (corners < 0) | (corners >= totals)
+    for column, name in ((1, "texture coordinates"), (2, "normals")):
+        count = int((outside & (written != 0))[:, column].sum())
+        if count:
+            found.out_of_range[name] = found.out_of_range.get(name, 0) + count
+    corners[(written == 0) | outside] = NOWHERE
     # What is not there beside the position is no mistake.
     corners[:, 0][corners[:, 0] == NOWHERE] = IMPOSSIBLE
     return sizes, corners.astype(np.int32)
 
 
-def _corners(piece: bytes, count: int) -> Indices:
-    """(count, 3) the numbers of `v`, `v/vt`, `v//vn` and `v/vt/vn`; 0 where there is none."""
+def _corners(piece: bytes, count: int, unreadable: list[str]) -> Indices:
+    """(count, 3) the numbers of `v`, `v/vt`, `v//vn` and `v/vt/vn`; 0 where there is none, and for all of a
+    corner that is no numbers, which is added to `unreadable`."""
     result = np.zeros((count, 3), np.int64)
     if count == 0:
         return result
@@ -277,15 +289,10 @@ def _corners(piece: bytes, count: int) -> Indices:
             result[:, columns] = numbers.reshape(count, -1)
             return result
     for row, word in zip(result, piece.split(), strict=True):
-        for place, text in enumerate(word.split(b"/")[:3]):
-            row[place] = _index(text)
+        try:
+            indices = [int(text or 0) for text in word.split(b"/")[:3]]
+        except ValueError:
+            unreadable.append(word[:20].decode("utf-8", "replace"))
+            continue
+        row[: len(indices)] = [index if abs(index) < 1 << 62 else 0 for index in indices]
     return result
-
-
-def _index(word: bytes) -> int:
-    try:
-        index = int(word or 0)
-    except ValueError:
-        shown = word[:20].decode("utf-8", "replace")
-        raise InputError(f"is no OBJ mesh, or a damaged one ({shown!r} is no index)") from None
-    return index if abs(index) < 1 << 62 else 0

@@ -15,6 +15,7 @@ from incpt.core.errors import InputError
 from incpt.core.files import read_bytes
 from incpt.formats import import_report
 from incpt.formats.clean import tell_of_faces, usable_mesh
+from incpt.formats.import_report import counted
 from incpt.formats.obj.lines import IMPOSSIBLE, NOWHERE, ObjText, State, decoded, read_text
 from incpt.formats.obj.mtl import MaterialLibrary
 from incpt.formats.outside import check_inside
@@ -44,6 +45,9 @@ def read_obj(path: Path) -> MeshFile:
     library = _materials(path, text)
     _tell_of_rest(text)
     found = [(name, key[1], mesh) for name, key, mesh in zip(_names(keys), keys, meshes, strict=True) if mesh]
+    used = {material for _, material, _ in found} & library.materials.keys()
+    counts = {"object": len(found), "material": len(used)}
+    import_report.read(", ".join(counted(n, what) for what, n in counts.items() if n))
     source = MeshSource(file=os.path.abspath(path))
     return MeshFile(
         tuple(
@@ -189,10 +193,25 @@ def _files(folder: Path, line: str) -> list[str]:
 
 
 def _tell_of_rest(text: ObjText) -> None:
-    for count, what in ((text.lines, "lines"), (text.points, "points")):
+    if text.unreadable:
+        others = f" and {len(text.unreadable) - 1:,} more" if len(text.unreadable) > 1 else ""
+        import_report.left_out(f"faces at a corner {text.unreadable[0]!r}{others}: it is no index")
+    for name, count in text.out_of_range.items():
+        import_report.left_out(f"{name} of {counted(count, 'corner')}: are not in the file")
+    undirected = int((~(np.abs(text.normals).max(axis=1, initial=0) > 0)).sum())
+    if undirected:
+        import_report.changed(
+            f"{counted(undirected, 'normal')}: without direction, for which faces have their own"
+        )
+    undefined = int((~np.isfinite(text.uvs).all(axis=1)).sum())
+    if undefined:
+        import_report.changed(
+            f"{counted(undefined, 'pair')} of texture coordinates: no numbers, which count as 0"
+        )
+    for count, what in ((text.lines, "line"), (text.points, "point")):
         if count:
-            import_report.left_out(f"{count:,} {what}: have no area")
+            import_report.left_out(f"{counted(count, what)} without area")
     if text.curves:
         import_report.left_out("curves and surfaces: only polygons are read; export them as polygons")
     for keyword, count in text.unknown.items():
-        import_report.left_out(f"{count:,} lines with {keyword!r}: the keyword is not known")
+        import_report.left_out(f"{counted(count, 'line')} with {keyword!r}: the keyword is not known")
