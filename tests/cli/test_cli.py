@@ -454,8 +454,17 @@ def test_it_runs_as_a_module() -> None:
     ("arguments", "module", "passed_on"),
     [
         ([], "incpt.ui.app", (None, None)),
-        (["edit"], "incpt.ui.app", (None, None)),
-        (["edit", "a.toml", "--device", "0"], "incpt.ui.app", (Path("a.toml"), "0")),
+        (["edit"], "incpt.ui.app", (None, None, {"up": None, "unit": None})),
+        (
+            ["edit", "a.toml", "--device", "0"],
+            "incpt.ui.app",
+            (Path("a.toml"), "0", {"up": None, "unit": None}),
+        ),
+        (
+            ["edit", "a.stl", "--up", "z", "--unit", "mm"],
+            "incpt.ui.app",
+            (Path("a.stl"), None, {"up": "z", "unit": 0.001}),
+        ),
         (["bench", "rays", "-h"], "incpt.benchmarks.main", (["rays", "-h"],)),
     ],
 )
