@@ -313,6 +313,25 @@ def test_what_a_material_loses_is_told(tmp_path: Path) -> None:
     ]
 
 
+def test_numbers_out_of_their_range_are_told(tmp_path: Path) -> None:
+    path = written(
+        tmp_path, f"{SQUARE}usemtl m\nf 1 2 3\n", "newmtl m\nNs 5000\nd -1\nNi 1.5\nPr 1\naniso 0\n"
+    )
+    assert told(path, Fate.CHANGED) == [
+        "Ns of material 'm' in a.mtl: 5000 does not lie from 0 to 1000",
+        "d of material 'm' in a.mtl: -1 does not lie from 0 to 1",
+    ]
+
+
+def test_a_missing_file_with_spaces_in_its_name_is_told_as_one(tmp_path: Path) -> None:
+    (tmp_path / "b.mtl").write_text("newmtl m\nKd 1 0 0\n")
+    path = written(tmp_path, f"mtllib my old model.mtl\nmtllib b.mtl c.mtl\n{SQUARE}usemtl m\nf 1 2 3\n")
+    assert told(path) == [
+        f"materials of {name}: {tmp_path / name}: no such file; check the path"
+        for name in ("my old model.mtl", "c.mtl")
+    ]
+
+
 def test_files_outside_of_the_folder_are_not_opened(tmp_path: Path) -> None:
     inner = tmp_path / "inner"
     inner.mkdir()

@@ -40,7 +40,12 @@ def camera_of(node: Node, document: Document, bounds: npt.NDArray[np.floating]) 
             distance = max(float(np.linalg.norm(bounds[1] - bounds[0])) / 2, 1e-3)
         values = {"projection": kind, "near": max(lens.number("znear", 0.0), 0.0)}
         if kind == "perspective":
-            values["fov_y"] = min(math.degrees(lens.number("yfov", math.radians(40), 1e-3)), _LARGEST_FOV_Y)
+            angle = math.degrees(lens.number("yfov", math.radians(40), 1e-3))
+            if angle > _LARGEST_FOV_Y:
+                import_report.changed(
+                    f"camera {name!r}: its view of {angle:.4g} degrees, to {_LARGEST_FOV_Y:g}"
+                )
+            values["fov_y"] = min(angle, _LARGEST_FOV_Y)
         else:
             # `xmag` is the picture's own aspect here, as `aspectRatio` is.
             values["ortho_height"] = 2 * max(abs(lens.number("ymag", 1.0)), 1e-6)

@@ -30,6 +30,10 @@ from incpt.scene.texture import Bitmap, Texture
 LARGEST_EXPONENT = 1000.0
 """Of `Ns`, which is a mirror."""
 _NUMBERS = ("ns", "ni", "d", "tr", "illum", "pr", "pm", "ps", "pc", "pcr", "aniso", "anisor")
+_RANGES = {
+    "ns": (0.0, LARGEST_EXPONENT), "ni": (1.0, 100.0), "d": (0.0, 1.0), "tr": (0.0, 1.0), "pr": (0.0, 1.0),
+    "pm": (0.0, 1.0), "ps": (0.0, 1.0), "pc": (0.0, 1.0), "pcr": (0.0, 1.0), "aniso": (0.0, 1.0),
+}  # fmt: skip
 _COLORS = ("kd", "ks", "ke", "tf")
 _SILENT = ("ka", "map_ka", "sharpness")
 """What says how light is to be imagined that is computed here."""
@@ -148,6 +152,12 @@ def _entries(content: bytes, file: str) -> tuple[dict[str, _Entry], set[str]]:
         try:
             if not _take(entry, keyword, rest):
                 unknown.add(keyword)
+            elif keyword in _RANGES:
+                low, high = _RANGES[keyword]
+                number = entry.numbers[keyword]
+                if not low <= number <= high:
+                    what = f"{words[0]} of material {name!r} in {file}"
+                    import_report.changed(f"{what}: {number:g} does not lie from {low:g} to {high:g}")
         except InputError as error:
             import_report.left_out(f"{words[0]} of material {name!r} in {file}: {error}")
     return entries, unknown

@@ -186,10 +186,16 @@ def _materials(path: Path, text: ObjText) -> MaterialLibrary:
 
 
 def _files(folder: Path, line: str) -> list[str]:
-    """The names in a line of `mtllib`: one with spaces, or several, whose own spaces have a backslash."""
+    """The names in a line of `mtllib`: one with spaces, or several, whose own spaces have a backslash. Where
+    none of them is there, the line is one name."""
     if (folder / line).is_file():
         return [line]
-    return [name.replace("\\ ", " ").replace("\\", "/") for name in re.split(r"(?<!\\)\s+", line)]
+    names = [_plain_name(name) for name in re.split(r"(?<!\\)\s+", line)]
+    return names if any((folder / name).is_file() for name in names) else [_plain_name(line)]
+
+
+def _plain_name(name: str) -> str:
+    return name.replace("\\ ", " ").replace("\\", "/")
 
 
 def _tell_of_rest(text: ObjText) -> None:

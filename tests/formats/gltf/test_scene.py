@@ -228,6 +228,14 @@ def test_cameras_and_lamps_are_used_as_they_are(tmp_path: Path) -> None:
     assert saved_and_loaded(scene, tmp_path) == scene
 
 
+def test_a_view_that_is_too_wide_is_told(tmp_path: Path) -> None:
+    wide = {"type": "perspective", "perspective": {"yfov": 3.14159, "znear": 0.01}}
+    nodes = [{"mesh": 0}, {"camera": 0, "name": "wide", "translation": [0, 0, 5]}]
+    scene, report = read(write(tmp_path / "a.gltf", nodes, scenes=[{"nodes": [0, 1]}], cameras=[wide]))
+    assert scene.camera.fov_y == 179
+    assert [one.text for one in report.of(Fate.CHANGED)] == ["camera 'wide': its view of 180 degrees, to 179"]
+
+
 def test_what_stands_at_a_flattened_node_is_left_out(tmp_path: Path) -> None:
     lamp = {"extensions": {"KHR_lights_punctual": {"light": 0}}}
     nodes = [
