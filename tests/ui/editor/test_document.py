@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from incpt.core.errors import InputError, InputWarning, OutputError
+from incpt.formats.import_report import Fate
 from incpt.scene import summary
 from incpt.scene.change import diff
 from incpt.scene.mesh import Mesh
@@ -92,7 +93,7 @@ def test_a_mesh_file_opens_as_an_untitled_scene_and_tells_what_it_lost(tmp_path:
     document = Document.open(path)
     assert document.path is None and document.name == "tri" and not document.is_dirty
     assert len(document.warnings) == 1 and "tri.obj" in document.warnings[0]
-    (remark,) = document.report.remarks
+    (remark,) = document.report.of(Fate.LEFT_OUT)
     assert document.warnings == (str(remark),) and remark.file == str(path)
 
 
