@@ -24,7 +24,7 @@ from incpt.formats.gltf.compression import DRACO
 from incpt.formats.gltf.document import Document
 from incpt.formats.gltf.lights import light_of, watts_of
 from incpt.formats.gltf.materials import Materials
-from incpt.formats.gltf.names import Names
+from incpt.formats.names import Names
 from incpt.formats.gltf.nodes import Node, Nodes, instances
 from incpt.formats.gltf.table import Table
 from incpt.formats.gltf.textures import Textures

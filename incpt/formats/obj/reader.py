@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from incpt.core.files import read_bytes
 from incpt.formats import import_report
 from incpt.formats.clean import tell_of_faces, usable_mesh
 from incpt.formats.import_report import counted
+from incpt.formats.names import Names
 from incpt.formats.obj.lines import IMPOSSIBLE, NOWHERE, ObjText, State, decoded, read_text
 from incpt.formats.obj.mtl import MaterialLibrary
 from incpt.formats.outside import check_inside
@@ -39,8 +41,7 @@ def read_obj(path: Path) -> MeshFile:
     keys = list(dict.fromkeys(_part_of(run.state) for run in text.runs))
     place = {key: number for number, key in enumerate(keys)}
     part_of_run = np.array([place[_part_of(run.state)] for run in text.runs], np.int64)
-    part_of = part_of_run[triangles.run]
-    meshes = [_mesh(text, triangles, normals, np.flatnonzero(part_of == i), counts) for i in range(len(keys))]
+    meshes = _Meshes(text, triangles, normals, counts).of(part_of_run[triangles.run], len(keys))
     tell_of_faces(counts)
     library = _materials(path, text)
     _tell_of_rest(text)
@@ -70,18 +71,12 @@ def _part_of(state: State) -> tuple[str, str]:
 
 def _names(keys: Sequence[tuple[str, str]]) -> list[str]:
     """Names of parts, no two alike: with the material where an object has several."""
-    several = {name for name, _ in keys if sum(other == name for other, _ in keys) > 1}
-    used: set[str] = set()
-    names = []
-    for name, material in keys:
-        whole = f"{name}/{material}" if name in several and material and name else name or material or "part"
-        unique, number = whole, 1
-        while unique in used:
-            number += 1
-            unique = f"{whole}.{number}"
-        used.add(unique)
-        names.append(unique)
-    return names
+    uses = Counter(name for name, _ in keys)
+    names = Names()
+    return [
+        names.new(f"{name}/{material}" if name and material and uses[name] > 1 else name or material or "part")
+        for name, material in keys
+    ]
 
 
 class _Triangles:
@@ -136,33 +131,54 @@ def _smoothed(text: ObjText, triangles: _Triangles) -> Array:
     return np.concatenate([text.normals, sums])
 
 
-def _mesh(
-    text: ObjText, triangles: _Triangles, normals: Array, chosen: Indices, counts: dict[str, int]
-) -> Mesh | None:
-    """The mesh of some triangles, with the vertices that they use."""
-    faces = triangles.positions[chosen]
-    is_used = np.zeros(len(text.vertices) + 1, bool)
-    is_used[np.where(faces < 0, len(text.vertices), faces)] = True
-    is_used = is_used[:-1]
-    place = np.append(np.cumsum(is_used) - 1, IMPOSSIBLE)
-    faces = place[np.where(faces < 0, len(text.vertices), faces)]
-    at_normals, at_uvs = triangles.normals[chosen], triangles.uvs[chosen]
-    colors = None
-    if text.colors is not None:
-        linear = linear_from_srgb(np.clip(text.colors[is_used], 0, 1))
-        colors = np.concatenate([linear, np.ones((len(linear), 1))], axis=1)
-    has_uvs, has_normals = bool((at_uvs >= 0).any()), bool((at_normals >= 0).any())
-    # Corners without the one or the other take what stands behind all of them.
-    uvs = (np.concatenate([text.uvs * [1, -1] + [0, 1], [[0, 0]]]),) if has_uvs else ()
-    return usable_mesh(
-        text.vertices[is_used],
-        faces,
-        np.concatenate([normals, np.full((1, 3), np.nan)]) if has_normals else None,
-        counts,
-        VertexAttributes(uvs, colors),
-        normal_at=np.where(at_normals < 0, len(normals), at_normals) if has_normals else None,
-        uv_at=np.where(at_uvs < 0, len(text.uvs), at_uvs) if has_uvs else None,
-    )
+class _Meshes:
+    """Makes the meshes of parts, each of what it uses alone: a file may have thousands of parts."""
+
+    def __init__(self, text: ObjText, triangles: _Triangles, normals: Array, counts: dict[str, int]) -> None:
+        self._text, self._triangles, self._normals, self._counts = text, triangles, normals, counts
+        largest = max(len(text.vertices), len(text.uvs), len(normals))
+        # What is not there is counted from the end.
+        self._place = np.zeros(largest - IMPOSSIBLE, np.int64)
+
+    def of(self, part_of: Indices, count: int) -> list[Mesh | None]:
+        """The mesh of each of so many parts, None where no face is left; `part_of` (T,) tells of each triangle
+        the part."""
+        order = np.argsort(part_of, kind="stable")
+        ends = np.cumsum(np.bincount(part_of, minlength=count))
+        return [self._mesh(chosen) for chosen in np.split(order, ends[:-1])]
+
+    def _mesh(self, chosen: Indices) -> Mesh | None:
+        """That of the triangles with these numbers."""
+        text, triangles = self._text, self._triangles
+        used, faces = self._renumbered(triangles.positions[chosen])
+        used_uvs, uv_at = self._renumbered(triangles.uvs[chosen])
+        used_normals, normal_at = self._renumbered(triangles.normals[chosen])
+        colors = None
+        if text.colors is not None:
+            linear = linear_from_srgb(np.clip(text.colors[used], 0, 1))
+            colors = np.concatenate([linear, np.ones((len(linear), 1))], axis=1)
+        # Corners without the one or the other take what stands behind all of them.
+        uvs = np.concatenate([text.uvs[used_uvs] * [1, -1] + [0, 1], [[0, 0]]])
+        normals = np.concatenate([self._normals[used_normals], np.full((1, 3), np.nan)])
+        return usable_mesh(
+            text.vertices[used],
+            faces,
+            normals if len(used_normals) else None,
+            self._counts,
+            VertexAttributes((uvs,) if len(used_uvs) else (), colors),
+            normal_at=np.where(normal_at < 0, len(used_normals), normal_at) if len(used_normals) else None,
+            uv_at=np.where(uv_at < 0, len(used_uvs), uv_at) if len(used_uvs) else None,
+        )
+
+    def _renumbered(self, places: Indices) -> tuple[Indices, Indices]:
+        """The places (n,) of an array that are used, in their order, and `places` counted among them. Those
+        that are not there, below 0, stay as they are."""
+        there = places[places >= 0]
+        numbers = np.arange(len(there))
+        self._place[there] = numbers
+        used = np.sort(there[self._place[there] == numbers])
+        self._place[used] = numbers[: len(used)]
+        return used, np.where(places < 0, places, self._place[places])
 
 
 def _materials(path: Path, text: ObjText) -> MaterialLibrary:
