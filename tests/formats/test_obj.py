@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from incpt.core.errors import InputError, InputWarning
 from incpt.formats import mesh_files, polygons, registry
 from incpt.formats.import_report import Fate
+from incpt.formats.obj import lines
 from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh
 from incpt.scene.mesh_part import MeshPart
@@ -173,6 +174,46 @@ def test_all_ways_to_write_a_corner(tmp_path: Path) -> None:
         assert (bool(mesh.uvs), mesh.normals is not None) == (has_uvs, has_normals)
         if has_uvs and "77" not in line and "//" not in line:
             np.testing.assert_allclose(mesh.uvs[0], [[[0, 1], [1, 1], [1, 0]]])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "v 0 0 0\nvn 0 0 1\nv 1 0 0\nvn 0 0 1\nv 1 1 0\nvn 0 1 1\nv 0 1 0\nf 1//1 2//2 3//3\nf 1//1 3//3 4//1\n",
+        "vn 0 0 1\nv 0 0 0\n\n\tvn 0 0 1\n  v 1 0 0\nvn 0 1 1\nv 1 1 0\ng\n f 1//1 2//2 3//3\n v 0 1 0\n"
+        "f -4//-3 -2//-1 -1//-3\n",
+    ],
+    ids=["vertices in turn", "faces in between"],
+)  # fmt: skip
+def test_vertices_may_stand_in_any_order(tmp_path: Path, text: str) -> None:
+    plain = f"{SQUARE}vn 0 0 1\nvn 0 0 1\nvn 0 1 1\nf 1//1 2//2 3//3\nf 1//1 3//3 4//1\n"
+    expected = mesh_files.load_mesh(written(tmp_path, plain, name="plain.obj"))
+    mesh = mesh_files.load_mesh(written(tmp_path, text))
+    for name in ("vertices", "faces", "normals"):
+        np.testing.assert_array_equal(getattr(mesh, name), getattr(expected, name))
+
+
+def test_a_vertex_without_numbers_counts(tmp_path: Path) -> None:
+    path = written(tmp_path, f"v\n{SQUARE}f 2 3 4\nf 1 2 3\nf\n")
+    assert told(path) == [
+        "2 of 3 faces: 1 with fewer than three corners, 1 with a vertex that is not finite or too far away"
+    ]
+    assert area(mesh_files.load_mesh(path)) == 0.5
+
+
+def test_thousands_of_parts_are_read_in_one_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither parts nor vertices in turn make as many small pieces."""
+    calls: list[int] = []
+    numbers = lines._numbers
+    monkeypatch.setattr(lines, "_numbers", lambda *given: calls.append(1) or numbers(*given))
+    blocks = [
+        f"v {i} 0 0\nvn 0 0 1\nv {i} 1 0\nvn 0 0 1\nv {i} 0 1\nvn 0 0 1\ng part {i}\nf -3//-3 -2//-2 -1//-1\n"
+        for i in range(2000)
+    ]
+    parts = mesh_files.load_parts(written(tmp_path, "".join(blocks)))
+    assert [part.name for part in parts[:2]] == ["part 0", "part 1"] and len(calls) == 2
+    assert [len(part.mesh.vertices) for part in parts] == [3] * 2000
+    np.testing.assert_array_equal(parts[1999].mesh.vertices[:, 0], 1999)
 
 
 def test_what_has_no_area_is_told(tmp_path: Path) -> None:

@@ -10,7 +10,6 @@ import re
 import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -105,74 +104,111 @@ def decoded(content: bytes) -> bytes:
 
 
 def plain_text(content: bytes) -> bytes:
-    """The text without comments, with lines that end alike, and with those that go on in the next one put
-    together."""
+    """The text without comments and indents, with lines that end alike, and with those that go on in the next
+    one put together."""
     if b"\r" in content:
         content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if b"\\\n" in content:
         content = content.replace(b"\\\n", b" ")
     if b"#" in content:
         content = re.sub(rb"#[^\n]*", b"", content)
+    if content[:1] in (b" ", b"\t") or b"\n " in content or b"\n\t" in content:
+        content = re.sub(rb"(?m)^[ \t]+", b"", content)
     return content if content.endswith(b"\n") else content + b"\n"
 
 
 def read_text(content: bytes) -> ObjText:
     """What the lines say. Raises InputError for a line that is none of OBJ's."""
-    content = plain_text(content)
-    found, state = ObjText(), State()
+    lines = _Lines(plain_text(content))
+    found = ObjText()
     rows: dict[bytes, list[Array]] = {name: [] for name in (*_WIDTHS, b"color")}
-    totals = dict.fromkeys(_WIDTHS, 0)
-    for key, piece, lines in _pieces(content):
-        if key in _WIDTHS:
-            numbers = _numbers(piece, lines)
+    for key, width in _WIDTHS.items():
+        for chosen in _at_once(lines.of(key)):
+            numbers = _numbers(lines.text(chosen, key), len(chosen))
             if key == b"v":
                 rows[b"color"].append(_colors_of(numbers))
-            rows[key].append(_fitted(numbers, _WIDTHS[key]))
-            totals[key] += lines
-        elif key in (b"f", b"fo"):
-            sizes, corners = _faces(found, piece, lines, np.array(list(totals.values())))
-            found.runs.append(FaceRun(state, sizes, corners))
-        else:
-            state = _said(found, state, key, piece.strip().decode("utf-8", "replace"))
+            rows[key].append(_fitted(numbers, width))
     found.vertices, found.uvs, found.normals = (
         np.concatenate([np.zeros((0, _WIDTHS[name])), *rows[name]]) for name in _WIDTHS
     )
     colors = np.concatenate([np.zeros((0, 3)), *rows[b"color"]])
     found.colors = None if np.isnan(colors).all() else np.nan_to_num(colors, nan=1.0)
+    _read_faces(found, lines)
     return found
 
 
-def _pieces(content: bytes) -> Iterator[tuple[bytes, bytes, int]]:
-    """Keyword, text and number of lines: of neighbours with the same of v, vt, vn and f together, without
-    the keyword; of other lines that say anything one by one."""
-    buffer = np.frombuffer(content, np.uint8)
-    ends = np.flatnonzero(buffer == _NEWLINE)
-    starts = np.concatenate([[0], ends[:-1] + 1])
-    kinds = _kinds(buffer, starts, ends)
-    changes = np.flatnonzero(np.diff(kinds)) + 1
-    bounds = np.unique(np.concatenate([[0], changes, np.arange(0, len(kinds), _MOST_LINES), [len(kinds)]]))
-    for first, last in pairwise(bounds.tolist()):
-        text = content[starts[first] : ends[last - 1]]
-        if kinds[first] < len(_FREQUENT):
-            key = _FREQUENT[kinds[first]]
+def _read_faces(found: ObjText, lines: _Lines) -> None:
+    """Takes in the faces, and the lines between them that say what they belong to."""
+    state, faces, first = State(), lines.of(b"f"), 0
+    for number in [*lines.others.tolist(), lines.count]:
+        words = lines.words(number)
+        is_face = words[:1] == [b"fo"]
+        then = state if is_face or not words else _said(found, state, words)
+        if then != state or is_face or number == lines.count:
+            last = int(np.searchsorted(faces, number))
+            for chosen in _at_once(faces[first:last]):
+                _add_run(found, state, lines, chosen, b"f")
+            if is_face:
+                _add_run(found, state, lines, np.array([number]), b"fo")
+            state, first = then, last
+
+
+def _add_run(found: ObjText, state: State, lines: _Lines, chosen: Indices, key: bytes) -> None:
+    totals = np.stack([np.searchsorted(lines.of(name), chosen) for name in _WIDTHS], axis=1)
+    found.runs.append(FaceRun(state, *_faces(found, lines.text(chosen, key), totals)))
+
+
+class _Lines:
+    """The lines of a text, of which those with the same of v, vt, vn and f are read together, wherever they
+    stand: what a vertex is does not depend on the lines around it."""
+
+    def __init__(self, content: bytes) -> None:
+        self._content = content
+        buffer = np.frombuffer(content, np.uint8)
+        self._ends = np.flatnonzero(buffer == _NEWLINE)
+        self._starts = np.concatenate([[0], self._ends[:-1] + 1])
+        kinds = _kinds(buffer, self._starts, self._ends)
+        self._numbers = {key: np.flatnonzero(kinds == kind) for kind, key in enumerate(_FREQUENT)}
+        self.others = np.flatnonzero(kinds == len(_FREQUENT))
+        """The numbers of all other lines."""
+        self.count = len(kinds)
+
+    def of(self, key: bytes) -> Indices:
+        """The numbers of the lines with one of these keywords."""
+        return self._numbers[key]
+
+    def words(self, number: int) -> list[bytes]:
+        """The keyword of a line, and what follows it; nothing of a blank line, or behind the last."""
+        if number == self.count:
+            return []
+        return self._content[self._starts[number] : self._ends[number]].split(None, 1)
+
+    def text(self, chosen: Indices, key: bytes) -> bytes:
+        """Lines with a keyword, without it."""
+        starts, ends = self._starts[chosen], self._ends[chosen]
+        if chosen[-1] - chosen[0] + 1 == len(chosen):
             blank = b" " * len(key)
-            yield key, blank + text[len(key) :].replace(b"\n" + key, b"\n" + blank), last - first
-            continue
-        for line in text.split(b"\n"):
-            words = line.split(None, 1)
-            if words:
-                yield words[0], words[1] if len(words) > 1 else b"", 1
+            text = self._content[starts[0] : ends[-1]]
+            return blank + text[len(key) :].replace(b"\n" + key, b"\n" + blank)
+        begins = (starts + len(key)).tolist()
+        return b"\n".join(self._content[a:b] for a, b in zip(begins, ends.tolist(), strict=True))
+
+
+def _at_once(numbers: Indices) -> Iterator[Indices]:
+    """The numbers of lines, in portions that are read together."""
+    for first in range(0, len(numbers), _MOST_LINES):
+        yield numbers[first : first + _MOST_LINES]
 
 
 def _kinds(buffer: npt.NDArray[np.uint8], starts: Indices, ends: Indices) -> npt.NDArray[np.uint8]:
     """(lines,) the place of each line's keyword in _FREQUENT, or one behind the last."""
     kinds = np.full(len(starts), len(_FREQUENT), np.uint8)
     for number, key in enumerate(_FREQUENT):
-        fits = ends - starts > len(key)
+        fits = ends - starts >= len(key)
         for place, byte in enumerate(key):
             fits &= buffer[np.minimum(starts + place, ends)] == byte
         behind = buffer[np.minimum(starts + len(key), ends)]
-        kinds[fits & ((behind == _SPACE) | (behind == _TAB))] = number
+        kinds[fits & np.isin(behind, (_SPACE, _TAB, _NEWLINE))] = number
     return kinds
 
 
@@ -212,8 +248,9 @@ def _read(text: bytes, dtype: type) -> npt.NDArray[Any]:
             return np.zeros(0, dtype)
 
 
-def _said(found: ObjText, state: State, key: bytes, rest: str) -> State:
+def _said(found: ObjText, state: State, words: list[bytes]) -> State:
     """The state behind a line that is no vertex and no face."""
+    key, rest = words[0], b"".join(words[1:]).strip().decode("utf-8", "replace")
     if key in _STATES:
         changed: dict[str, Any] = {_STATES[key]: rest}
         return replace(state, **changed)
@@ -260,10 +297,12 @@ def _colors_of(numbers: Array) -> Array:
     return colors
 
 
-def _faces(found: ObjText, piece: bytes, lines: int, totals: Indices) -> tuple[Indices, Corners]:
-    """Sizes and corners of faces, see FaceRun, where there are `totals` of each kind of vertex so far."""
-    sizes = _words_in_lines(piece, lines)
+def _faces(found: ObjText, piece: bytes, totals: Indices) -> tuple[Indices, Corners]:
+    """Sizes and corners of faces, see FaceRun. `totals` (lines, 3): how many of each kind of vertex stand
+    before the line of each."""
+    sizes = _words_in_lines(piece, len(totals))
     written = _corners(piece, int(sizes.sum()), found.unreadable)
+    totals = np.repeat(totals, sizes, axis=0)
     corners = np.where(written > 0, written - 1, written + totals)
     outside = (corners < 0) | (corners >= totals)
     for column, name in ((1, "texture coordinates"), (2, "normals")):

@@ -74,7 +74,9 @@ def _names(keys: Sequence[tuple[str, str]]) -> list[str]:
     uses = Counter(name for name, _ in keys)
     names = Names()
     return [
-        names.new(f"{name}/{material}" if name and material and uses[name] > 1 else name or material or "part")
+        names.new(
+            f"{name}/{material}" if name and material and uses[name] > 1 else name or material or "part"
+        )
         for name, material in keys
     ]
 
