@@ -36,6 +36,8 @@ RINGING = 0.01
 
 _quiet_lock = threading.Lock()
 _images: weakref.WeakValueDictionary[tuple[str, int, int], Image] = weakref.WeakValueDictionary()
+_remarks: weakref.WeakKeyDictionary[Image, tuple[import_report.Remark, ...]] = weakref.WeakKeyDictionary()
+"""What was told of images when they were read."""
 
 
 def write_png(
@@ -115,7 +117,10 @@ def load_image(path: str | os.PathLike[str]) -> Image:
     if image is None:
         # What has no suffix of an image may be one all the same; its content is checked.
         row = registry.format_of(path, FileKind.IMAGE) or OPENEXR
-        image = _images[key] = row.read(path)
+        with import_report.gathered() as told:
+            image = _images[key] = row.read(path)
+        _remarks[image] = told.report.remarks
+    import_report.tell(*_remarks[image])
     return image
 
 

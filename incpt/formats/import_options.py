@@ -15,6 +15,10 @@ from types import NoneType
 from incpt.core.checks import one_of, require_bool
 from incpt.scene.checks import LARGEST, set_number
 
+UP_AXES = ("y", "z")
+SMALLEST_UNIT = 1e-6
+"""Metres; a smaller one would flatten objects."""
+
 
 @dataclass(frozen=True)
 class ImportOptions:
@@ -34,9 +38,9 @@ class ImportOptions:
             set_number(self, "time", 0.0, LARGEST)
         require_bool("allow_outside", self.allow_outside)
         if self.up is not None:
-            one_of("up", self.up, ("y", "z"))
+            one_of("up", self.up, UP_AXES)
         if self.unit is not None:
-            set_number(self, "unit", 1e-6, LARGEST)
+            set_number(self, "unit", SMALLEST_UNIT, LARGEST)
 
 
 _DEFAULT = ImportOptions()

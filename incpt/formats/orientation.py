@@ -13,7 +13,7 @@ import numpy as np
 
 from incpt.core.checks import described
 from incpt.core.errors import InputError
-from incpt.formats.import_options import current_options
+from incpt.formats.import_options import SMALLEST_UNIT, current_options
 from incpt.scene.checks import LARGEST
 from incpt.scene.mesh_part import MeshPart
 from incpt.scene.transform import IDENTITY, Transform
@@ -22,8 +22,6 @@ ROTATIONS = {"y": (0.0, 0.0, 0.0), "z": (-90.0, 0.0, 0.0)}
 """What turns files to y up, by the axis that is up in them."""
 UNITS: Mapping[str, float] = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048}
 """Metres of a unit."""
-SMALLEST_UNIT = 1e-6
-"""Metres; a smaller one would flatten objects."""
 
 
 def unit_of(text: str) -> float:

@@ -50,6 +50,16 @@ def test_primaries_become_those_of_rec_709(tmp_path: Path) -> None:
     np.testing.assert_array_equal(images.load_image(same).pixels, flat(0.5, 0.2, 0.1))
 
 
+def test_an_image_that_is_in_use_tells_again(tmp_path: Path) -> None:
+    path = tmp_path / "a.png"
+    PIL.Image.new("RGB", (4, 2), (9, 9, 9)).save(path)
+    with import_report.gathered() as first:
+        image = images.load_image(path)
+    with import_report.gathered() as second:
+        assert images.load_image(path) is image
+    assert first.report == second.report and len(first.report.of(Fate.CHANGED)) == 1
+
+
 def test_colours_that_rec_709_has_not_are_clipped_and_told(tmp_path: Path) -> None:
     pixels = flat(0.2, 0.2, 0.2)
     pixels[:2] = (0, 1, 0)

@@ -139,6 +139,8 @@ def _local(table: Table) -> Matrix:
             matrix[3] = [0, 0, 0, 1]
         return matrix
     found = {name: np.array(table.numbers(name, default)) for name, default in _PROPERTIES.items()}
+    if not found["rotation"].any():
+        import_report.changed(f"the rotation of {table.place}: is all zeros, and counts as none")
     return composed(found["translation"], found["rotation"], found["scale"])
 
 

@@ -139,6 +139,13 @@ def test_damaged_nodes_are_one_line(tmp_path: Path, nodes: list[dict[str, Any]],
         read(path)
 
 
+def test_a_rotation_of_zeros_is_told(tmp_path: Path) -> None:
+    scene, report = read(write(tmp_path / "a.gltf", [{"mesh": 0, "rotation": [0, 0, 0, 0]}]))
+    assert scene.objects[0].rotation == (0, 0, 0)
+    (remark,) = (one for one in report.of(Fate.CHANGED) if "rotation" in one.text)
+    assert "is all zeros" in remark.text and "0" in remark.text
+
+
 def test_hidden_nodes_hide_what_is_below_them(tmp_path: Path) -> None:
     hidden = {"extensions": {"KHR_node_visibility": {"visible": False}}}
     nodes = [{"children": [1], **hidden}, {"mesh": 0, "name": "below"}, {"mesh": 0, "name": "seen"}]
