@@ -14,9 +14,9 @@ from incpt.core.checks import one_of
 from incpt.core.errors import InputError, in_place
 from incpt.formats import import_report
 from incpt.formats.gltf.document import Document
-from incpt.formats.names import Names
 from incpt.formats.gltf.table import Table
 from incpt.formats.gltf.textures import Textures
+from incpt.formats.names import Names
 from incpt.scene.checks import LARGEST
 from incpt.scene.material import (
     LARGEST_CUTOFF,

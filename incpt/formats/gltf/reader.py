@@ -24,12 +24,12 @@ from incpt.formats.gltf.compression import DRACO
 from incpt.formats.gltf.document import Document
 from incpt.formats.gltf.lights import light_of, watts_of
 from incpt.formats.gltf.materials import Materials
-from incpt.formats.names import Names
 from incpt.formats.gltf.nodes import Node, Nodes, instances
 from incpt.formats.gltf.table import Table
 from incpt.formats.gltf.textures import Textures
 from incpt.formats.import_options import current_options
 from incpt.formats.import_report import counted
+from incpt.formats.names import Names
 from incpt.formats.placement import placed_arrays
 from incpt.scene.camera import Camera
 from incpt.scene.mesh import Mesh, MeshSource
