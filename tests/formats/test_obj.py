@@ -179,9 +179,10 @@ def test_all_ways_to_write_a_corner(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "v 0 0 0\nvn 0 0 1\nv 1 0 0\nvn 0 0 1\nv 1 1 0\nvn 0 1 1\nv 0 1 0\nf 1//1 2//2 3//3\nf 1//1 3//3 4//1\n",
-        "vn 0 0 1\nv 0 0 0\n\n\tvn 0 0 1\n  v 1 0 0\nvn 0 1 1\nv 1 1 0\ng\n f 1//1 2//2 3//3\n v 0 1 0\n"
-        "f -4//-3 -2//-1 -1//-3\n",
+        """v 0 0 0\nvn 0 0 1\nv 1 0 0\nvn 0 0 1\nv 1 1 0\nvn 0 1 1\nv 0 1 0
+        f 1//1 2//2 3//3\nf 1//1 3//3 4//1""",
+        """vn 0 0 1\nv 0 0 0\n\n\tvn 0 0 1\n  v 1 0 0\nvn 0 1 1\nv 1 1 0\ng
+        f 1//1 2//2 3//3\n v 0 1 0\nf -4//-3 -2//-1 -1//-3""",
     ],
     ids=["vertices in turn", "faces in between"],
 )  # fmt: skip

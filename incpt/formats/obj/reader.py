@@ -143,8 +143,8 @@ class _Meshes:
         self._place = np.zeros(largest - IMPOSSIBLE, np.int64)
 
     def of(self, part_of: Indices, count: int) -> list[Mesh | None]:
-        """The mesh of each of so many parts, None where no face is left; `part_of` (T,) tells of each triangle
-        the part."""
+        """The mesh of each of so many parts, None where no face is left; `part_of` (T,): that of each
+        triangle."""
         order = np.argsort(part_of, kind="stable")
         ends = np.cumsum(np.bincount(part_of, minlength=count))
         return [self._mesh(chosen) for chosen in np.split(order, ends[:-1])]
