@@ -133,14 +133,20 @@ INLINE void pool_cell(__global const float *sums, __global float *cells, __globa
     const float per_freedom = 1.0f / MAX(sum[CELL_SUM_FREEDOM_PAIRS], 1.0f);
     const float covered = 2.0f * sum[CELL_SUM_PAIR_PRODUCTS] - old_weight * sum[CELL_SUM_PAIR_SQUARES_OLD];
     const float known_share = freedom / (freedom + PRIOR_FREEDOM);
+    const float variance =
+        known_share * new_variance + (class == 1u ? (1.0f - known_share) * new_moment : 0.0f);
+    // Pairs may be a few of all samples, among them the bright ones: then they seem to cover more than there
+    // is, and pixels of no variance would outweigh all around them.
+    const float pair_freedom = sum[CELL_SUM_FREEDOM_PAIRS];
+    const float most_covered = variance * pair_freedom / (pair_freedom + PRIOR_FREEDOM);
     __global float *rule = rules + class * total + cell;
     const uint next = CLASSES * total;
     rule[RULE_OLD_WEIGHT * next] = old_weight;
     rule[RULE_BASE_SHARE * next] = class == 1u ? resemblance : 1.0f;
-    rule[RULE_VARIANCE * next] =
-        known_share * new_variance + (class == 1u ? (1.0f - known_share) * new_moment : 0.0f);
+    rule[RULE_VARIANCE * next] = variance;
     rule[RULE_PRIOR * next] = class == 1u ? 0.0f : (1.0f - known_share) * PRIOR_VARIANCE;
-    rule[RULE_COVERED * next] = known_share * per_freedom * covered;
+    rule[RULE_COVERED * next] =
+        MIN(known_share * per_freedom * covered, most_covered / MAX(old_weight, 1e-6f));
 }
 
 // Goes over each class of each row of cells. `rules` has RulePlane for each class.

@@ -195,6 +195,7 @@ class Known:
     touched: Array
     pair_squares_old: Array
     pair_products: Array
+    freedom_pairs: Array
 
 
 def known(state: State, changed: npt.NDArray[np.bool_], enough: float = 300) -> list[Known]:
@@ -222,6 +223,7 @@ def known(state: State, changed: npt.NDArray[np.bool_], enough: float = 300) -> 
                 touched,
                 pair_squares_old / np.maximum(freedom_pairs, 1),
                 pair_products / np.maximum(freedom_pairs, 1),
+                freedom_pairs,
             )
         )
     return result
@@ -277,13 +279,16 @@ def rules(about: list[Known]) -> list[Rule]:
         weight = np.where(one.pairs > 0, fitting, 1)
         share = one.freedom_new / (one.freedom_new + 4)
         resemblance = np.clip(1.5 * weight - 0.5, 0, 1)
+        variance = share * one.new_variance + i * (1 - share) * one.new_moment
+        covered = share * (2 * one.pair_products - weight * one.pair_squares_old)
+        most = variance * one.freedom_pairs / (one.freedom_pairs + 4) / np.maximum(weight, 1e-6)
         result.append(
             Rule(
                 weight,
                 resemblance if i else np.ones_like(weight),
-                share * one.new_variance + i * (1 - share) * one.new_moment,
+                variance,
                 (1 - i) * 0.5 * (1 - share),
-                share * (2 * one.pair_products - weight * one.pair_squares_old),
+                np.minimum(covered, most),
             )
         )
     return result

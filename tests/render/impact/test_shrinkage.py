@@ -352,3 +352,31 @@ def test_groups_of_work_items_make_the_same_picture(
     rig.fold()
     expected = reference.worth(state, reference.known(state, edit.guides.changed), edit.guides.changed)
     np.testing.assert_allclose(rig.film.sums()[RADIANCE.name][3], expected, rtol=2e-3)
+
+
+def test_bright_pairs_among_samples_without_partners_drown_nobody(device: Device) -> None:
+    """What a few pairs cover is more than the variance of all samples then."""
+    rng = np.random.default_rng(5)
+    edit = made_up.edit(96, 64, rng)
+    pictures = []
+    for bright in (0.0, 30.0):
+        rng = np.random.default_rng(5)
+        state = edit.state(rng)
+        for index in range(12):
+            new, old, met = edit.samples(rng)
+            if index < 2:  # in the shadow
+                new[40:48:3, 64:72:3] += bright
+                old[40:48:3, 64:72:3] += bright
+                met[40:48, 64:72] = 1
+            here = np.ones(met.shape, bool)
+            here[40:48, 64:72] = index < 2 or index > 3
+            state.add(index, np.where(here[..., None], new, np.nan), old, met, single=index >= 2)
+        rig = Rig(device, 96, 64)
+        rig.load(state, edit.guides)
+        pictures.append(rig.picture())
+    around = np.zeros((64, 96), bool)
+    around[28:60, 52:84] = True
+    around[38:50, 62:74] = False
+    around &= ~edit.guides.changed
+    plain, beside = (error(shown[around], edit.new[around]) for shown in pictures)
+    assert beside < 1.5 * plain
