@@ -5,6 +5,8 @@
 // The class of a pixel is the highest bit of its label: 1 where an object changed itself, see
 // impact/guides.cl.
 INLINE uint class_of(uint label) { return label >> 31; }
+// Whether the target is a guess of what a pixel shows, see impact/shrinkage.cl.
+INLINE int has_target_at(uint label) { return (int)(label >> 30) & 1; }
 
 // The class of a pixel as factors, of which one is 1 and the other 0. Compilers make choices of places in
 // memory out of choices between classes, and vectorise badly over those.

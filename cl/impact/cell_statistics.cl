@@ -121,6 +121,7 @@ INLINE void pool_cell(__global const float *sums, __global float *cells, __globa
     known[CELL_FREEDOM_NEW * total] = freedom;
     known[CELL_PAIRS * total] = pairs;
     known[CELL_TOUCHED * total] = touched;
+    known[CELL_SAMPLES * total] = sum[CELL_SUM_SAMPLES];
 
     // Where nothing is known of old values, they count as new ones do.
     const float fitting = (covariance + LEAST_VARIANCE) / (old_variance + LEAST_VARIANCE);
@@ -190,9 +191,10 @@ __kernel WIDE void spread_cells(PICTURE_PARAMETERS, SPREADING_PARAMETERS) {
     }
 }
 
-// A work-item for each patch: its columns from the first to the last near which a sample met a change. A
-// change is spread over 1 + 2 + 4 + 8 pixels, and depends on weights as far away again: four cells.
-__kernel void find_spans(PICTURE_PARAMETERS, CELLS_PARAMETERS, SPANS_PARAMETERS) {
+// A work-item for each patch: its columns from the first to the last near which a sample met a change, or
+// where there is none yet and the target may stand. A change is spread over 1 + 2 + 4 + 8 pixels, and depends
+// on weights as far away again: four cells.
+__kernel void find_spans(PICTURE_PARAMETERS, CELLS_PARAMETERS, HAS_TARGET_PARAMETERS, SPANS_PARAMETERS) {
     const Patch patch = patch_at(width, height, CELL_SIZE, (uint)get_global_id(0));
     if (patch.top >= height)
         return;
@@ -203,10 +205,13 @@ __kernel void find_spans(PICTURE_PARAMETERS, CELLS_PARAMETERS, SPANS_PARAMETERS)
     int first = columns, last = -1;
     for (int row = top; row <= bottom; row++)
         for (int column = left; column <= right; column++) {
-            __global const float *cell = cells + CELL_TOUCHED * total + row * columns + column;
-            const int changed = cell[0] + cell[CELL_PLANES * total] > 0.0f;
-            first = changed ? MIN(first, column) : first;
-            last = changed ? MAX(last, column) : last;
+            __global const float *first_class = cells + row * columns + column;
+            __global const float *second_class = first_class + CELL_PLANES * total;
+            const float touched = first_class[CELL_TOUCHED * total] + second_class[CELL_TOUCHED * total];
+            const float samples = first_class[CELL_SAMPLES * total] + second_class[CELL_SAMPLES * total];
+            const int changes = (touched > 0.0f) | ((has_target > 0u) & (samples == 0.0f));
+            first = changes ? MIN(first, column) : first;
+            last = changes ? MAX(last, column) : last;
         }
     const int from = MAX((first - around) * (int)CELL_SIZE, (int)patch.left);
     const int to = MIN((last + around + 1) * (int)CELL_SIZE, (int)patch.right);

@@ -3,8 +3,8 @@
 // Guides: which pixels belong together, so that what is known of one may be used for the other.
 //
 // The label of a pixel is a number for what its centre shows in the old and in the new scene together; its
-// highest bit is the class of the pixel. Pixels with different labels do not belong together, nor do those
-// whose normals differ by much.
+// highest bit is the class of the pixel, the next one says whether the target has what it shows. Pixels with
+// different labels do not belong together, nor do those whose normals differ by much.
 //
 // For each pixel and each scale the weights of its eight neighbours stand in two words, a byte each, row by
 // row from the upper left. They are parts of all of GUIDE_UNIT; what they leave is the pixel's own.

@@ -47,8 +47,8 @@ INLINE Vec3 change_of(const Half *samples_of, float per_sample, float per_pair, 
 
 __kernel WIDE void split_change(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PARAMETERS, CELLS_PARAMETERS,
                                 SPANS_PARAMETERS, COLUMN_RULES_PARAMETERS, HALVES_PARAMETERS,
-                                SMOOTH_HALVES_PARAMETERS, EVIDENCE_PARAMETERS, BASE_PARAMETERS,
-                                SHOWN_IMAGE_PARAMETERS) {
+                                SMOOTH_HALVES_PARAMETERS, EVIDENCE_PARAMETERS, TARGET_PARAMETERS,
+                                BASE_PARAMETERS, SHOWN_IMAGE_PARAMETERS) {
     const Patch patch = patch_of(width, height, CELL_SIZE);
     const size_t pixels = (size_t)width * height, size = field_size(width, height);
     const Patch near = near_change(&patch, height, spans);
@@ -86,6 +86,8 @@ __kernel WIDE void split_change(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PAR
     const uint total = cell_count(width, height);
     __global const float *touched = cells + CELL_TOUCHED * total + patch.row * cell_columns(width);
     __global const float *second_touched = touched + CELL_PLANES * total;
+    __global const float *sampled = touched + (CELL_SAMPLES - CELL_TOUCHED) * total;
+    __global const float *second_sampled = sampled + CELL_PLANES * total;
     EACH_ROW(y, near) {
         const CellRows rows = cell_rows_around(width, height, y);
         EACH_COLUMN(x, near) {
@@ -96,10 +98,13 @@ __kernel WIDE void split_change(PICTURE_PARAMETERS, PAIRS_PARAMETERS, LABELS_PAR
             const Rule rule = rule_between(column_rules, rule_size, &rows, x, &class);
             const int cell = (int)x / (int)CELL_SIZE;
             const int changed = class.first * touched[cell] + class.second * second_touched[cell] > 0.0f;
+            const int waits = class.first * sampled[cell] + class.second * second_sampled[cell] == 0.0f;
+            const int starts_from_target = has_target_at(labels[pixel]) & (changed | waits);
 
             const Vec3 refinement = refinement_of(&p, &anchor);
             const Vec3 refined = add(anchor.radiance, refinement);
-            const Vec3 base = scale(changed ? rule.base_share : 1.0f, refined);
+            const Vec3 guess = scale(changed ? rule.base_share : 1.0f, refined);
+            const Vec3 base = select(starts_from_target, vec3_at(target_image + 4u * pixel), guess);
             const Vec3 from_base = subtract(base, refined);
             const float weight = weight_of_pairs(&p, &rule);
             // One division serves four numbers, each at least 1 and at most some million.

@@ -383,6 +383,14 @@ SHOWN_IMAGE = Group(
     (_planes("shown_image", "interleaved: the shown radiance, and 1 where there is any"),),
 )
 
+TARGET = Group(
+    "TARGET",
+    None,
+    (_table("target_image", "float", "interleaved: the picture that was shown before, where labels say so"),),
+)
+
+HAS_TARGET = Group("HAS_TARGET", None, (_count("has_target", "1 where any label says so, or else 0"),))
+
 SHOWN_SHARES = Group(
     "SHOWN_SHARES", None, (_planes("shown_shares", "how much of the noise of its change a pixel shows"),)
 )
@@ -489,7 +497,7 @@ GROUPS = (
     BLOCK_MEMORY, RADIANCE, CHANGES, PARTNERS, FIRST_HITS, TRACED, COUNTERS, REDUCTION, RESOLUTION, PICTURE,
     PAIRS, OLD_VALUES, LABELS, NORMALS, GUIDES, TILE_COLUMNS, COLUMN_SUMS, CELL_SUMS, CELLS, RULES,
     COLUMN_RULES, SPREADING, SPANS, SLOPES, SCALE, HALVES, SMOOTH_HALVES, DETAILS, EVIDENCE, CELL_EVIDENCE,
-    POOLED_EVIDENCE, COLUMN_EVIDENCE, BASE, SHOWN_IMAGE, SHOWN_SHARES,
+    POOLED_EVIDENCE, COLUMN_EVIDENCE, BASE, TARGET, HAS_TARGET, SHOWN_IMAGE, SHOWN_SHARES,
     ITEMS, MESH, BOXES, CHUNKS, MEASURES, BINS, SIDES, MOVED, LEVEL, SPLITTING, LINKING, LEAVES, REFITTING,
 )  # fmt: skip
 """Every group."""
@@ -522,14 +530,14 @@ KERNELS: dict[str, tuple[Group, ...]] = {
     "measure_cells": (PICTURE, PAIRS, LABELS, CELL_SUMS),
     "pool_cells": (PICTURE, CELL_SUMS, CELLS, RULES),
     "spread_cells": (PICTURE, SPREADING),
-    "find_spans": (PICTURE, CELLS, SPANS),
+    "find_spans": (PICTURE, CELLS, HAS_TARGET, SPANS),
     "tile_columns": (
         *(PICTURE, PAIRS, LABELS, CELLS, RULES, SLOPES, SHOWN_IMAGE, SHOWN_SHARES, TILE_COLUMNS),
     ),
     "sum_columns": (COLUMN_SUMS,),
     "split_change": (
         *(PICTURE, PAIRS, LABELS, CELLS, SPANS, COLUMN_RULES),
-        *(HALVES, SMOOTH_HALVES, EVIDENCE, BASE, SHOWN_IMAGE),
+        *(HALVES, SMOOTH_HALVES, EVIDENCE, TARGET, BASE, SHOWN_IMAGE),
     ),
     "smooth_change": (
         *(PICTURE, LABELS, GUIDES, SPANS, SCALE, HALVES, SMOOTH_HALVES, DETAILS, EVIDENCE, CELL_EVIDENCE),

@@ -447,7 +447,7 @@ class CellPlane(IntEnum):
     """What the pixels of a cell that have one class, and of cells around it, say of samples: the variance in
     the new and in the old scene and the covariance of both, means over the channels; the mean square of the
     difference from the kept picture; degrees of freedom of the first, and pairs behind the others; how many
-    samples met something that changed."""
+    samples met something that changed, and how many there are."""
 
     NEW_VARIANCE = 0
     OLD_VARIANCE = 1
@@ -456,6 +456,7 @@ class CellPlane(IntEnum):
     FREEDOM_NEW = 4
     PAIRS = 5
     TOUCHED = 6
+    SAMPLES = 7
 
 
 class RulePlane(IntEnum):

@@ -26,6 +26,7 @@ from incpt.render.batch import Batch
 from incpt.render.film import RADIANCE, Film, tile_image
 from incpt.render.first_hits import FirstHits
 from incpt.render.impact.comparison import Comparison, Prepared, compared
+from incpt.render.impact.target import Target
 from incpt.render.impact.tile_sums import TileSums
 from incpt.render.modes import Mode
 from incpt.render.params import path_params
@@ -100,11 +101,13 @@ class SessionState:
 @dataclass(frozen=True, eq=False)
 class Snapshot:
     """A picture on the host and where its session stood; see `Session.snapshot`. `sums` is what the film
-    held, as `Film.sums` returns it."""
+    held, as `Film.sums` returns it; `target`: what the picture of an edited scene starts from, if it is not
+    in them."""
 
     scene: Scene
     progress: Progress
     sums: Mapping[str, npt.NDArray[np.float32]]
+    target: Target | None = None
 
 
 class Session:
@@ -266,10 +269,11 @@ class Session:
 
     def snapshot(self) -> Snapshot:
         """Scene, settings and picture as they are now, for `restore`."""
-        film = self._state.film
+        film, comparison = self._state.film, self._state.comparison
         # Nothing is in them.
         film = film if self.progress.anchor is not None else film.with_planes(())
-        return Snapshot(self.scene, self.progress, film.sums())
+        target = None if comparison is None else comparison.target
+        return Snapshot(self.scene, self.progress, film.sums(), target)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from where a session stood. A tile that was under way then starts again. On an error
@@ -281,7 +285,7 @@ class Session:
         film.restore(snapshot.sums)
         path_buffer = PathBuffer.of_settings(self.device, settings, self._state.path_buffer)
         progress = replace(snapshot.progress, cursor=cursor)
-        tables, comparison = self._tables_for(progress, snapshot.scene, None)
+        tables, comparison = self._tables_for(progress, snapshot.scene, None, snapshot.target)
         self._state = SessionState(progress, film, path_buffer, tables, comparison, self._prepared)
 
     def image(self, alpha: bool = False, first_sight: bool = False) -> npt.NDArray[np.float32]:
@@ -449,8 +453,9 @@ class Session:
 
     def _brought(self, state: SessionState, progress: Progress, scene: Scene) -> SessionState:
         """`state` after an edit that leads to `progress`. What can fail comes before the film changes."""
-        tables, comparison = self._tables_for(progress, scene, state.comparison)
         before, strategy = state.progress, strategy_of(progress.settings)
+        target = _target_after(state, progress, scene)
+        tables, comparison = self._tables_for(progress, scene, state.comparison, target)
         # Memory for pairs is made with the first edit, since many pictures never see one.
         is_needed = progress.anchor is not None or state.film.has_planes(strategy.planes)
         film = state.film.with_planes(strategy.planes if is_needed else ())
@@ -470,15 +475,22 @@ class Session:
         )
 
     def _tables_for(
-        self, progress: Progress, scene: Scene, before: Comparison | None
+        self, progress: Progress, scene: Scene, before: Comparison | None, target: Target | None = None
     ) -> tuple[SceneTables, Comparison | None]:
         """The tables of a scene, which share what they can with those of this one, and what compares it with
-        its anchor; `before`: what compared the scene before it."""
+        its anchor; `before`: what compared the scene before it, `target`: what the picture starts from."""
         pool = self._tables.pool
         if progress.anchor is None:
             return tables_of(pool, scene, self._tables), None
         comparison = compared(
-            self._tracer, progress.settings, progress.anchor, scene, self._tables, before, self._prepared
+            self._tracer,
+            progress.settings,
+            progress.anchor,
+            scene,
+            self._tables,
+            before,
+            self._prepared,
+            target,
         )
         return comparison.tables, comparison
 
@@ -535,3 +547,13 @@ def _limited(scene: Scene, settings: RenderSettings) -> Scene:
 
 def _new_film(device: Device, settings: RenderSettings) -> Film:
     return Film(device, *settings.size, passes_of(settings), is_transparent=settings.transparent)
+
+
+def _target_after(state: SessionState, progress: Progress, scene: Scene) -> Target | None:
+    """What the picture of `scene` starts from after `state`, if not from the kept one."""
+    comparison, left = state.comparison, state.progress.error_left
+    if comparison is None or progress.anchor is not state.progress.anchor:
+        return None
+    if left is None or state.progress.is_untouched or comparison.tables.scene is scene:
+        return comparison.target
+    return comparison.target_after(state.film, left)

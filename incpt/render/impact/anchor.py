@@ -24,19 +24,25 @@ class Anchor:
 
     def affected(self, scene: Scene) -> tuple[Placed, ...]:
         """The objects and lights that look different in `scene`, as they are here and as they are there."""
-        return tuple(affected_objects(self.scene, scene, diff(self.scene, scene)))
+        return affected(self.scene, scene)
 
     def touched(self, scene: Scene) -> frozenset[str]:
         """The names of the objects and lights that differ in `scene`, or that wear a material that does."""
-        return _touched(self.scene, scene)
+        return touched(self.scene, scene)
 
     def serves(self, scene: Scene, edited: Scene) -> bool:
         """Whether an edit that makes `edited` of `scene` changes only what differs from the anchor already,
         so that the anchor serves for what comes as well."""
-        return _touched(scene, edited) <= self.touched(scene)
+        return touched(scene, edited) <= self.touched(scene)
 
 
-def _touched(old: Scene, new: Scene) -> frozenset[str]:
+def affected(old: Scene, new: Scene) -> tuple[Placed, ...]:
+    """The objects and lights that look different in both scenes, as they are in each."""
+    return tuple(affected_objects(old, new, diff(old, new)))
+
+
+def touched(old: Scene, new: Scene) -> frozenset[str]:
+    """The names of the objects and lights that differ, or that wear a material that does."""
     change = diff(old, new)
     wearing = {obj.name for scene in (old, new) for obj in scene.objects if obj.material in change.materials}
     return change.objects | change.lights | wearing

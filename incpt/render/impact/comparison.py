@@ -15,6 +15,7 @@ from incpt.render.impact.anchor import Anchor
 from incpt.render.impact.estimator import Estimator, SeenPair
 from incpt.render.impact.exploration import most_blur, windows
 from incpt.render.impact.first_sight import CenterHits, FirstSight, rows_columns, widened
+from incpt.render.impact.target import KNOWN, Target
 from incpt.render.impact.tile_sums import TileSums
 from incpt.render.tiles import TileGrid
 from incpt.render.tracer import Tracer
@@ -59,6 +60,7 @@ class Comparison:
     seen         what the pixels show of both.
     anchor_hits  what is seen in the anchor, and `hits` in the scene.
     first_sight  what to show of the scene where it has no sample yet.
+    target       what its picture starts from, if that is not the kept picture.
     """
 
     grid: TileGrid
@@ -70,6 +72,7 @@ class Comparison:
     anchor_hits: CenterHits
     hits: CenterHits
     first_sight: FirstSight
+    target: Target | None = None
 
     @property
     def prepared(self) -> Prepared:
@@ -83,6 +86,13 @@ class Comparison:
     def image(self, film: Film) -> Float32Array:
         """(H, W, 4) the picture of what the film has of pairs. It waits for the device."""
         return self.estimator.image(film, self.seen)
+
+    def target_after(self, film: Film, error_left: float) -> Target | None:
+        """What the next edit of the same objects starts from: the picture, if no more than KNOWN of the error
+        of the change is left in it. It waits for the device."""
+        if error_left > KNOWN or not film.is_whole:
+            return self.target
+        return Target(self.hits, film.with_coverage(self.image(film)))
 
     def fold(self, film: Film) -> None:
         """Make the picture the kept one of the film, with the samples that its pixels are worth."""
@@ -101,9 +111,11 @@ def compared(
     tables: SceneTables,
     before: Comparison | None = None,
     prepared: Prepared | None = None,
+    target: Target | None = None,
 ) -> Comparison:
     """The comparison of a scene with its anchor. `tables` are those of the scene before the edit, with which
-    the new ones share what they can; `before`: its comparison, or else `prepared`. Raises DeviceError."""
+    the new ones share what they can; `before`: its comparison, or else `prepared`; `target`: what to start
+    from. Raises DeviceError."""
     pool, device = tables.pool, tracer.device
     grid = TileGrid(*settings.size, settings.tile_size)
     if before is not None and before.compares(anchor.scene, scene) and before.grid == grid:
@@ -120,9 +132,13 @@ def compared(
         reach = most_blur(grid, scene.camera, anchor.affected(scene))
         pair = replace(pair, changed=widened(pair.changed, reach))
     changes = change_tables(device, anchor.scene, scene)
-    sight_before = before.first_sight if before is not None and before.grid == grid else None
-    sight = FirstSight(anchor_hits, hits, seen, sight_before)
-    return Comparison(grid, old, new, changes, prepared.estimator, pair, anchor_hits, hits, sight)
+    if target is None:
+        sight_before = before.first_sight if before is not None and before.grid == grid else None
+        sight = FirstSight(anchor_hits, hits, seen, before=sight_before)
+    else:
+        pair = replace(pair, target=target.image, in_target=target.shows(hits, grid))
+        sight = FirstSight(target.hits, hits, target.windows(scene, grid), target.image)
+    return Comparison(grid, old, new, changes, prepared.estimator, pair, anchor_hits, hits, sight, target)
 
 
 def center_hits(tracer: Tracer, tables: SceneTables, settings: RenderSettings) -> CenterHits:
@@ -175,7 +191,7 @@ def _seen_pair(anchor: Anchor, old: CenterHits, new: CenterHits, seen: list[Wind
 
 
 def _label(before: npt.NDArray[np.int32], now: npt.NDArray[np.int32]) -> npt.NDArray[np.uint32]:
-    """A number below 2^31 for two objects. Where there are more than 32,768 of them, a few pixels are
+    """A number below 2^30 for two objects. Where there are more than 16,384 of them, a few pixels are
     filtered together by mistake."""
     pair = (before + 1).astype(np.uint32) * np.uint32(1 << 16) + (now + 1).astype(np.uint32)
-    return pair & np.uint32(0x7FFFFFFF)
+    return pair & np.uint32(0x3FFFFFFF)

@@ -20,11 +20,14 @@ from incpt.render.tiles import TileGrid
 
 @dataclass(frozen=True, eq=False)
 class SeenPair:
-    """What the pixel centres show of two scenes: the arguments of `Guides.set`, all (H, W) or (H, W, 3)."""
+    """What the pixel centres show of two scenes: the arguments of `Guides.set`, all (H, W) or (H, W, 3).
+    `target` (H, W, 4): the picture to start from at the pixels `in_target`."""
 
     labels: npt.NDArray[np.uint32]
     normals: npt.NDArray[np.float32]
     changed: npt.NDArray[np.bool_]
+    in_target: npt.NDArray[np.bool_] | None = None
+    target: Float32Array | None = None
 
 
 class Estimator:
@@ -48,7 +51,9 @@ class Estimator:
         if self._source == source:
             return
         if seen is not self._seen:
-            self.guides.set(seen.labels, seen.normals, seen.changed)
+            self.guides.set(seen.labels, seen.normals, seen.changed, seen.in_target)
+            if seen.target is not None:
+                self.shrinkage.set_target(seen.target)
             self._seen = seen
         self.statistics.update(film, self.guides)
         self.shrinkage.update(film, self.guides, self.statistics)

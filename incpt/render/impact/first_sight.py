@@ -1,11 +1,13 @@
-"""First sight: what an edit moved is drawn where it is now, before any sample of it is there.
+"""First sight: what an edit moved or recoloured is drawn as it is now, before any sample of it is there.
 
-Until the first samples come in, the kept picture shows an object where it was and not where it is. The rays
-through pixel centres tell what is there now: object, normal, base colour (`first_hits`). What they do not
-tell, the light, is taken from the kept picture, as *exposure*: radiance over base colour.
+Until the first samples come in, the picture from before the edit shows an object where it was and not where
+it is. The rays through pixel centres tell what is there now: object, normal, base colour (`first_hits`). What
+they do not tell, the light, is taken from the picture from before, as *exposure*: radiance over base colour.
 
 - A pixel that shows an object at its new place gets the exposure that surfaces of the same normal had at the
   old one: a table over normals as the camera sees them, as for lit spheres (Sloan et al. 2001).
+- A pixel that shows the object where it was, in another base colour and otherwise the same material, keeps
+  its exposure.
 - A pixel that showed the object, and shows something else now, gets the exposure of the pixels to the left
   and to the right that showed the same thing all the time: shadows and reflections of the object lie below
   it more often than beside it.
@@ -19,7 +21,7 @@ its first samples. Shadows and reflections wait for them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -28,12 +30,15 @@ import numpy.typing as npt
 from incpt.render.film import Film, Float32Array
 from incpt.render.first_hits import Window
 from incpt.render.tiles import TileGrid
+from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
 
 LARGEST_SHARE = 0.25
 """The largest part of the picture that is drawn so: where more is shown anew, nothing of it is old."""
 _LEAST_REFLECTANCE = 0.01
 """Base colours below count as that much, so that lamps and mirrors have an exposure as well."""
+_LITTLE_REFLECTANCE = 0.1
+"""Up to about here a channel of a base colour tells less of the light than the others do."""
 _MOST_PIXELS = 16384
 """Pixels of an object, evenly chosen, from which exposures are learnt."""
 _TABLE_SIZE = 24
@@ -70,30 +75,38 @@ class Patch:
 
 
 class FirstSight:
-    """That of a scene beside its anchor. `windows`: where they show different objects. It is made when it is
-    asked for first; `before` is another one, whose kept picture serves where it has the same anchor."""
+    """That of a scene, seen as `now` says, which starts from the picture of another one, seen as `then` says:
+    `picture` (H, W, 4) as `Film.image` has it, or else the kept one of the film. `windows`: where they look
+    different. It is made when it is asked for first; `before` is another one, whose picture serves where it
+    starts from the same scene."""
 
     def __init__(
-        self, anchor: CenterHits, now: CenterHits, windows: Sequence[Window], before: FirstSight | None = None
+        self,
+        then: CenterHits,
+        now: CenterHits,
+        windows: Sequence[Window],
+        picture: Float32Array | None = None,
+        before: FirstSight | None = None,
     ) -> None:
-        self._anchor, self._now, self._windows = anchor, now, _joined(windows)
-        shares = before is not None and before._anchor.scene is anchor.scene
-        self._kept: list[Float32Array] = before._kept if before is not None and shares else []
+        self._then, self._now, self._windows = then, now, _joined(windows)
+        self._pictures: list[Float32Array] = [] if picture is None else [picture]
+        if picture is None and before is not None and before._then.scene is then.scene:
+            self._pictures = before._pictures
         self._patches: list[Patch] | None = None
 
     def alone(self, film: Film) -> Float32Array | None:
-        """(H, W, 4) the kept picture with all that is drawn; None where nothing is. It waits for no kernel
-        once the kept picture was read."""
+        """(H, W, 4) the picture from before with all that is drawn; None where nothing is. It waits for no
+        kernel once that picture was read."""
         if not self._patches_on(film):
             return None
-        image = self._kept[0].copy()
+        image = self._pictures[0].copy()
         for patch in self._patches_on(film):
             image[rows_columns(patch.window)][patch.is_drawn] = patch.radiance[patch.is_drawn]
         return image
 
     def drawn_into(self, image: Float32Array, film: Film, grid: TileGrid, is_waiting: Mask) -> Float32Array:
         """`image` (H, W, 4) with what is drawn of the tiles (grid.count,) that wait for their first sample.
-        `film`: whose radiance is the kept picture."""
+        `film`: the session's."""
         for patch in self._patches_on(film):
             inside = rows_columns(patch.window)
             left, top, right, bottom = patch.window
@@ -109,24 +122,36 @@ class FirstSight:
         return self._patches
 
     def _made(self, film: Film) -> list[Patch]:
-        height, width = self._anchor.objects.shape
+        height, width = self._then.objects.shape
         area = sum((right - left) * (bottom - top) for left, top, right, bottom in self._windows)
-        if area > LARGEST_SHARE * width * height or not self._moved:
+        if area > LARGEST_SHARE * width * height:
             return []
         if not film.is_whole:  # There is no picture to take all light from.
             return []
-        if not self._kept:
-            self._kept.append(film.image())
-        picture = self._kept[0]
+        if not self._pictures:
+            self._pictures.append(film.image())
+        picture = self._pictures[0]
         patches = [self._patch(window, picture, film.is_transparent) for window in self._windows]
         return [patch for patch in patches if patch.is_drawn.any()]
 
     @cached_property
     def _moved(self) -> tuple[Mask, Mask]:
-        """Which objects of the anchor, and which of the scene, stand elsewhere or have another shape in the
-        other one. The last place, that of no object, is never among them."""
-        old, new = self._anchor.scene.objects, self._now.scene.objects
-        return _moved(old, new), _moved(new, old)
+        """Which objects of the scene before, and which of the scene now, are moved in the other one."""
+        old, new = self._then.scene.objects, self._now.scene.objects
+        return moved(old, new), moved(new, old)
+
+    @cached_property
+    def _restyled(self) -> tuple[Mask, Mask]:
+        """Which objects of the scene now wear another material where they were, and which of them one that
+        differs in nothing but its base colour. The last place is that of no object."""
+        old, new = self._then.scene, self._now.scene
+        was_there = {obj.name: old.materials[obj.material] for obj in old.objects}
+        materials = [new.materials[obj.material] for obj in new.objects]
+        pairs = [(was_there.get(obj.name, now), now) for obj, now in zip(new.objects, materials, strict=True)]
+        stays = ~self._moved[1]
+        restyled = np.array([old != now for old, now in pairs] + [False])
+        recoloured = np.array([_is_recoloured(old, now) for old, now in pairs] + [False])
+        return restyled & stays, restyled & stays & recoloured
 
     def _patch(self, window: Window, picture: Float32Array, is_transparent: bool) -> Patch:
         inside = rows_columns(window)
@@ -134,7 +159,7 @@ class FirstSight:
         objects = self._now.objects[inside]
         shows_moved = is_moved[objects]
         # Pixels around it, which show a bit of it, go with those that showed it.
-        uncovered = widened(was_moved[self._anchor.objects[inside]], 1) & ~shows_moved
+        uncovered = widened(was_moved[self._then.objects[inside]], 1) & ~shows_moved
         light = np.zeros((*objects.shape, 3), np.float32)
         for number in np.unique(objects[shows_moved]):
             chosen = shows_moved & (objects == number)
@@ -144,24 +169,30 @@ class FirstSight:
         for number in np.unique(objects[uncovered]):
             chosen = uncovered & (objects == number)
             light[chosen] = self._exposures_beside(int(number), chosen, window, picture)
-        radiance = light * _reflectance(objects, self._now.colors[inside])
+        reflectance = _reflectance(objects, self._now.colors[inside])
+        is_restyled, is_recoloured = self._restyled
+        shows_restyled = is_restyled[objects] & ~uncovered
+        chosen = is_recoloured[objects] & shows_restyled
+        light[shows_restyled] = (picture[inside][..., :3] / reflectance)[shows_restyled]
+        light[chosen] = self._evened_exposures(inside, picture)[chosen]
+        radiance = light * reflectance
         covered = (objects >= 0) | np.bool_(not is_transparent)
         shown = np.concatenate([radiance, covered[..., None]], axis=-1, dtype=np.float32)
-        return Patch(window, shows_moved | uncovered, shown)
+        return Patch(window, shows_moved | uncovered | shows_restyled, shown)
 
     def _exposures_of(
         self, number: int, normals: Float32Array, picture: Float32Array, window: Window
     ) -> Float32Array:
         """(n, 3) exposures of an object of the scene where it has these normals (n, 3)."""
-        anchor = self._anchor
-        place = anchor.scene.object_index.get(self._now.scene.objects[number].name)
-        seen = np.flatnonzero(anchor.objects.ravel() == place) if place is not None else np.zeros(0, np.intp)
+        then = self._then
+        place = then.scene.object_index.get(self._now.scene.objects[number].name)
+        seen = np.flatnonzero(then.objects.ravel() == place) if place is not None else np.zeros(0, np.intp)
         if len(seen) == 0:  # It was not there, or out of sight.
             around = self._exposures(rows_columns(window), picture).reshape(-1, 3)
             return np.broadcast_to(np.median(around, axis=0), normals.shape)
         seen = seen[:: -(-len(seen) // _MOST_PIXELS)]
-        places = self._places(anchor.normals.reshape(-1, 3)[seen])
-        colors = anchor.colors.reshape(-1, 3)[seen]
+        places = self._places(then.normals.reshape(-1, 3)[seen])
+        colors = then.colors.reshape(-1, 3)[seen]
         light = picture.reshape(-1, 4)[seen, :3]
         exposures = np.divide(light, np.maximum(colors, _LEAST_REFLECTANCE), dtype=np.float32)
         return _looked_up(_table_of(exposures, places), self._places(normals))
@@ -177,7 +208,7 @@ class FirstSight:
     ) -> Float32Array:
         """(n, 3) exposures of an object of the scene that stayed where it is, for the pixels of a window
         (h, w) that are asked for, row by row."""
-        height, width = self._anchor.objects.shape
+        height, width = self._then.objects.shape
         rows, columns = (np.flatnonzero(is_asked.any(axis=axis)) for axis in (1, 0))
         left, right = window[0] + columns[0], window[0] + columns[-1] + 1
         top, bottom = window[1] + rows[0], window[1] + rows[-1] + 1
@@ -186,8 +217,8 @@ class FirstSight:
         wide = rows_columns(
             (wide_left, wide_top, min(right + beside, width), min(bottom + _LEAST_MARGIN, height))
         )
-        objects = self._anchor.objects[wide]
-        place = self._anchor.scene.object_index[self._now.scene.objects[number].name] if number >= 0 else -1
+        objects = self._then.objects[wide]
+        place = self._then.scene.object_index[self._now.scene.objects[number].name] if number >= 0 else -1
         is_free = ~widened(self._moved[0][objects], _RIM)
         is_known = is_free & (objects == place)
         is_known = is_known if is_known.any() else is_free
@@ -198,11 +229,20 @@ class FirstSight:
         asked: Float32Array = filled[row + window[1] - wide_top, column + window[0] - wide_left]
         return asked
 
+    def _evened_exposures(self, inside: tuple[slice, slice], picture: Float32Array) -> Float32Array:
+        """(h, w, 3) as `_exposures`, but a channel of which the colour reflects little takes those of all
+        for its own: most of what it shows is a sheen that has no colour."""
+        then, radiance = self._then, picture[inside][..., :3]
+        reflectance = _reflectance(then.objects[inside], then.colors[inside])
+        grey = radiance.sum(axis=-1, keepdims=True) / reflectance.sum(axis=-1, keepdims=True)
+        evened: Float32Array = (radiance + _LITTLE_REFLECTANCE * grey) / (reflectance + _LITTLE_REFLECTANCE)
+        return evened
+
     def _exposures(self, inside: tuple[slice, slice], picture: Float32Array) -> Float32Array:
-        """(h, w, 3) of the kept picture."""
-        anchor = self._anchor
+        """(h, w, 3) of the picture from before."""
+        then = self._then
         exposures: Float32Array = picture[inside][..., :3] / _reflectance(
-            anchor.objects[inside], anchor.colors[inside]
+            then.objects[inside], then.colors[inside]
         )
         return exposures
 
@@ -226,7 +266,9 @@ def _joined(windows: Sequence[Window]) -> tuple[Window, ...]:
     return tuple(found)
 
 
-def _moved(objects: Sequence[Object], others: Sequence[Object]) -> Mask:
+def moved(objects: Sequence[Object], others: Sequence[Object]) -> Mask:
+    """Which objects stand elsewhere, or have another shape, than their namesakes among the others, or have
+    none there. The last place, that of no object, is never among them."""
     shapes = {other.name: _shape(other) for other in others}
     return np.array([_shape(one) != shapes.get(one.name) for one in objects] + [False])
 
@@ -234,6 +276,11 @@ def _moved(objects: Sequence[Object], others: Sequence[Object]) -> Mask:
 def _shape(one: Object) -> tuple[object, ...]:
     # Meshes are compared by identity, see Mesh.
     return id(one.mesh), one.transform, one.visible
+
+
+def _is_recoloured(old: Material, new: Material) -> bool:
+    as_before = replace(new, base_color=old.base_color, base_color_texture=old.base_color_texture)
+    return not any(old.emission) and as_before == old
 
 
 def _reflectance(objects: npt.NDArray[np.int32], colors: Float32Array) -> Float32Array:

@@ -12,7 +12,7 @@ from incpt.core import layout
 from incpt.device.device import Device
 from incpt.render.impact.patches import Patches
 
-_CLASS_BIT = np.uint32(1 << 31)
+_CLASS_BIT, _TARGET_BIT = np.uint32(1 << 31), np.uint32(1 << 30)
 
 
 class Guides:
@@ -27,22 +27,32 @@ class Guides:
         # Beyond the edges of the picture nothing counts.
         device.fill(self.weights, 0, 4 * weights)
         self.set(
-            np.zeros((height, width), np.uint32), np.zeros((height, width, 3)), np.zeros((height, width))
+            np.zeros((height, width), np.uint32),
+            np.zeros((height, width, 3)),
+            np.zeros((height, width), np.bool_),
         )
 
     def set(
-        self, labels: npt.NDArray[np.integer], normals: npt.NDArray[np.floating], changed: npt.ArrayLike
+        self,
+        labels: npt.NDArray[np.integer],
+        normals: npt.NDArray[np.floating],
+        changed: npt.NDArray[np.bool_],
+        in_target: npt.NDArray[np.bool_] | None = None,
     ) -> None:
         """What the pixel centres show in the old and in the new scene.
 
-        labels   (H, W) below 2^31: a number for both objects together. Pixels with different ones do not
-                 belong together.
-        normals  (H, W, 3) of the new scene, world space, unit length; 0 where a pixel shows no surface.
-        changed  (H, W) whether the object itself changed, in its place or in its material: such pixels have
-                 statistics of their own.
+        labels     (H, W) below 2^30: a number for both objects together. Pixels with different ones do not
+                   belong together.
+        normals    (H, W, 3) of the new scene, world space, unit length; 0 where a pixel shows no surface.
+        changed    (H, W) whether the object itself changed, in its place or in its material: such pixels have
+                   statistics of their own.
+        in_target  (H, W) whether the target shows the same; None: there is no target.
         """
         device = self.patches.device
-        words = np.asarray(labels, np.uint32) | np.where(np.asarray(changed) != 0, _CLASS_BIT, np.uint32(0))
+        words = np.asarray(labels, np.uint32) | changed * _CLASS_BIT
+        if in_target is not None:
+            words |= in_target * _TARGET_BIT
+        self.has_target = in_target is not None and bool(in_target.any())
         device.write(self.labels, words)
         device.write(self._normals, np.moveaxis(np.asarray(normals, np.float32), 2, 0))
         self._weigh(self.patches)

@@ -37,6 +37,8 @@ class Shrinkage:
         self.shown = {"shown_image": self.image_buffer, "shown_shares": device.empty(4 * pixels)}
         """Kernel arguments: that picture, and how much of the noise of its change each pixel near one shows
         there."""
+        self._target_buffer = self._touched(16 * pixels)
+        self._target: Float32Array | None = None
         self._halves = tuple(self._field(len(layout.HalfPlane)) for _ in range(2))
         self._planes = {
             "details": self._touched(4 * 3 * _DETAILS * pixels),
@@ -46,6 +48,12 @@ class Shrinkage:
             "pooled_evidence": device.empty(4 * _CELL_EVIDENCE * patches.cells),
             "column_evidence": self._touched(4 * _CELL_EVIDENCE * width * patches.cell_rows),
         }
+
+    def set_target(self, image: Float32Array) -> None:
+        """The picture to start from where labels say so: (H, W, 4), as `Film.image` has it."""
+        if image is not self._target:
+            self.patches.device.write(self._target_buffer, image)
+            self._target = image
 
     def update(self, film: Film, guides: Guides, statistics: Statistics) -> None:
         """Make the picture that the film has, by statistics that are up to date."""
@@ -92,6 +100,7 @@ class Shrinkage:
             "cells": statistics.cells,
             "column_rules": statistics.column_rules,
             "spans": statistics.spans,
+            "target_image": self._target_buffer,
             **self.shown,
         }
 

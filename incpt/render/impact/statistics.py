@@ -95,6 +95,7 @@ class Statistics:
             "cells": self.cells,
             "rules": self._rules,
             "spans": self.spans,
+            "has_target": int(guides.has_target),
             "slopes": self._slopes,
         }
 

@@ -79,7 +79,10 @@ class Rig:
 
     def load(self, state: reference.State, guides: reference.Guides) -> None:
         self.film.restore({RADIANCE.name: state.anchor_sums(), PAIR_SUMS.name: state.planes()})
-        self.guides.set(guides.labels, guides.normals, guides.changed)
+        self.guides.set(guides.labels, guides.normals, guides.changed, guides.in_target)
+        if guides.target is not None:
+            target = np.concatenate([guides.target, np.ones((*guides.labels.shape, 1))], axis=-1)
+            self.shrinkage.set_target(target.astype(np.float32))
 
     def picture(self) -> Array:
         """(H, W, 3)"""

@@ -84,11 +84,19 @@ def finite(radiance: Array) -> Array:
 
 @dataclass
 class Guides:
-    """(H, W) labels, (H, W, 3) normals and (H, W) whether a pixel's own object changed."""
+    """(H, W) labels, (H, W, 3) normals and (H, W) whether a pixel's own object changed; the picture (H, W, 3)
+    that is started from at the pixels `in_target` (H, W), where there is one."""
 
     labels: npt.NDArray[np.integer]
     normals: Array
     changed: npt.NDArray[np.bool_]
+    in_target: npt.NDArray[np.bool_] | None = None
+    target: Array | None = None
+
+    @property
+    def starts(self) -> npt.NDArray[np.bool_]:
+        """(H, W) `in_target`, nowhere if there is none."""
+        return np.zeros(self.labels.shape, bool) if self.in_target is None else self.in_target
 
     def weights(self, step: int) -> Array:
         """(9, H, W) of the neighbours at that distance, row by row; they sum up to 1."""
@@ -100,6 +108,7 @@ class Guides:
             cosine = np.clip((self.normals * normals).sum(-1), 0, 1)
             surface = (self.normals != 0).any(-1) | (normals != 0).any(-1)
             same = inside * (labels == self.labels) * (changed == self.changed)
+            same = same * (shifted(self.starts, dy, dx) == self.starts)
             kernel = (2 - abs(dy) // step) * (2 - abs(dx) // step) / 4
             weights[i] = kernel * (1.0 if dx == dy == 0 else same * np.where(surface, cosine**16, 1))
         weights = np.floor(weights / weights.sum(0) * GUIDE_UNIT + 0.5) / GUIDE_UNIT
@@ -193,6 +202,7 @@ class Known:
     freedom_new: Array
     pairs: Array
     touched: Array
+    samples: Array
     pair_squares_old: Array
     pair_products: Array
     freedom_pairs: Array
@@ -221,6 +231,7 @@ def known(state: State, changed: npt.NDArray[np.bool_], enough: float = 300) -> 
                 freedom,
                 pairs,
                 touched,
+                samples,
                 pair_squares_old / np.maximum(freedom_pairs, 1),
                 pair_products / np.maximum(freedom_pairs, 1),
                 freedom_pairs,
@@ -358,6 +369,9 @@ def picture_and_shares(state: State, guides: Guides) -> tuple[Array, Array]:
     touched = touched_around(about, guides.changed)[..., None]
     refined = state.anchor + refinement(state)
     base = np.where(touched, rule.base_share[..., None], 1) * refined
+    if guides.target is not None:
+        waits = to_pixels([one.samples for one in about], guides.changed, interpolated=False)[..., None] == 0
+        base = np.where((touched | waits) & guides.starts[..., None], guides.target, base)
     change = np.where(touched, changes(state, pair_weight(state, rule), base), 0)
     shown, shares = shrunk(change, state.samples, sample_variance(state, rule), guides)
     return base + shown, shares

@@ -128,12 +128,35 @@ def test_a_drag_takes_its_light_from_before_it(device: Device) -> None:
     np.testing.assert_allclose(shown, at_once, rtol=1e-4, atol=1e-5)
 
 
+@pytest.mark.parametrize("colour", [(0.1, 0.8, 0.1), (0.9, 0.9, 0.9), (0.02, 0.02, 0.02)])
+def test_another_colour_is_seen_at_once(device: Device, colour: tuple[float, float, float]) -> None:
+    old = small_cube()
+    new = old.with_material("red", base_color=colour)
+    session = refined(device, old)
+    before, truth = session.image(), refined(device, new, 512).image()
+    cube = Session(replace(old), size=SIZE, device=device).first_hits().object_id == old.object_index[CUBE]
+    session.edit(new)
+    shown = session.first_sight()
+    assert shown is not None
+    assert error(shown, truth, cube) < 0.4 * error(before, truth, cube)
+
+
+def test_another_finish_stays_as_it_was(device: Device) -> None:
+    """What mirrors, shines through or glows cannot be told from a colour."""
+    session = refined(device, small_cube(), 16)
+    before = session.image()
+    session.edit(session.scene.with_material("red", base_color=(0.1, 0.8, 0.1), metallic=1.0))
+    shown = session.first_sight()
+    assert shown is not None
+    np.testing.assert_allclose(shown[..., :3], before, rtol=1e-5, atol=1e-6)
+
+
 def test_where_there_is_nothing_to_draw_there_is_none(device: Device) -> None:
     session = refined(device, small_cube(), 16)
     scene = session.scene
     assert session.first_sight() is None
-    session.edit(scene.with_material("red", base_color=(0.1, 0.8, 0.1)))
-    assert session.first_sight() is None, "a colour moves nothing"
+    session.edit(scene.with_added(replace(scene.object(CUBE), name="inside", scale=(0.1, 0.1, 0.1))))
+    assert session.first_sight() is None, "what is out of sight shows nothing"
     session.edit(scene)
     session.edit(scene.with_object("floor", position=(0, -0.1, 0)))
     assert session.first_sight() is None, "most of the picture is shown anew"

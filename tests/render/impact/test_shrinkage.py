@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from render.impact import made_up, reference
@@ -352,6 +354,61 @@ def test_groups_of_work_items_make_the_same_picture(
     rig.fold()
     expected = reference.worth(state, reference.known(state, edit.guides.changed), edit.guides.changed)
     np.testing.assert_allclose(rig.film.sums()[RADIANCE.name][3], expected, rtol=2e-3)
+
+
+def with_target(edit: made_up.Edit, rng: np.random.Generator) -> reference.Guides:
+    """The guides of an edit that starts from a picture of right and wrong parts, at most of its pixels."""
+    height, width = edit.guides.labels.shape
+    target = edit.new * (1 + 0.2 * rng.normal(size=edit.new.shape))
+    target[:, width // 2 :] = 0.1
+    in_target = np.ones((height, width), bool)
+    in_target[:, width // 3 : width // 3 + 5] = False
+    return replace(edit.guides, in_target=in_target, target=target)
+
+
+@pytest.mark.parametrize("spp", [0, 1, 2, 5])
+def test_pictures_with_a_target_equal_the_reference(device: Device, spp: int) -> None:
+    edit, state = sampled(70, 45, spp)
+    guides = with_target(edit, np.random.default_rng(1))
+    rig = Rig(device, 70, 45)
+    rig.load(state, guides)
+    np.testing.assert_allclose(rig.picture(), reference.picture(state, guides), atol=1e-4)
+
+
+def test_a_target_stands_until_samples_come_nearby(device: Device) -> None:
+    rng = np.random.default_rng(2)
+    edit = made_up.edit(200, 120, rng)
+    guides, state = with_target(edit, rng), edit.state(rng)
+    _, old, met = edit.samples(rng)
+    met[:] = 0
+    here = np.zeros(met.shape, bool)
+    here[:8, :8] = True
+    state.add(0, np.where(here[..., None], old, np.nan), old, met)
+    rig = Rig(device, 200, 120)
+    rig.load(state, guides)
+    shown = rig.picture()
+    refined = state.anchor + reference.refinement(state)
+    np.testing.assert_allclose(shown[:8, :8], refined[:8, :8], rtol=1e-5, err_msg="nothing was met there")
+    far = np.zeros(met.shape, bool)
+    far[24:] = True
+    expected = np.where(guides.in_target[..., None], guides.target, refined)
+    np.testing.assert_allclose(shown[far], expected[far], rtol=1e-5)
+
+
+def test_a_wrong_target_is_forgotten(device: Device) -> None:
+    rng = np.random.default_rng(3)
+    edit = made_up.edit(96, 64, rng)
+    errors = []
+    for target in (None, np.full((64, 96, 3), 0.05)):
+        rng = np.random.default_rng(3)
+        state = edit.state(rng, 4096.0)
+        for index in range(400):
+            state.add(index, *edit.samples(rng))
+        in_target = None if target is None else np.ones((64, 96), bool)
+        rig = Rig(device, 96, 64)
+        rig.load(state, replace(edit.guides, in_target=in_target, target=target))
+        errors.append(error(rig.picture(), edit.new))
+    assert errors[1] < 1.1 * errors[0]
 
 
 def test_bright_pairs_among_samples_without_partners_drown_nobody(device: Device) -> None:
