@@ -12,9 +12,10 @@ from incpt.device.device import Device
 from incpt.render.film import Film, Float32Array
 from incpt.render.first_hits import Window, first_hits
 from incpt.render.impact.anchor import Anchor
+from incpt.render.impact.center_hits import CenterHits
 from incpt.render.impact.estimator import Estimator, SeenPair
 from incpt.render.impact.exploration import most_blur, windows
-from incpt.render.impact.first_sight import CenterHits, FirstSight, rows_columns, widened
+from incpt.render.impact.first_sight import FirstSight, rows_columns, widened
 from incpt.render.impact.target import KNOWN, Target
 from incpt.render.impact.tile_sums import TileSums
 from incpt.render.tiles import TileGrid

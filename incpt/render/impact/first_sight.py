@@ -29,9 +29,10 @@ import numpy.typing as npt
 
 from incpt.render.film import Film, Float32Array
 from incpt.render.first_hits import Window
+from incpt.render.impact.center_hits import CenterHits, Mask
 from incpt.render.tiles import TileGrid
 from incpt.scene.material import Material
-from incpt.scene.model import Object, Scene
+from incpt.scene.model import Object
 
 LARGEST_SHARE = 0.25
 """The largest part of the picture that is drawn so: where more is shown anew, nothing of it is old."""
@@ -50,19 +51,6 @@ _SMOOTHED_ROWS = 9
 """Over so many rows exposures from beside are smoothed: each row has noise of its own."""
 _RIM = 2
 """So many pixels around what was moved show some of it, since pixels are areas."""
-
-Mask = npt.NDArray[np.bool_]
-
-
-@dataclass(frozen=True, eq=False)
-class CenterHits:
-    """What the rays through pixel centres meet first in a scene: the object's place in it, or -1 (H, W), and
-    the shading normal in world space and the base colour there (H, W, 3)."""
-
-    scene: Scene
-    objects: npt.NDArray[np.int32]
-    normals: Float32Array
-    colors: Float32Array
 
 
 @dataclass(frozen=True, eq=False)

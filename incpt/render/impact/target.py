@@ -11,14 +11,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
 from incpt.render.film import Float32Array
 from incpt.render.first_hits import Window
 from incpt.render.impact import exploration
-from incpt.render.impact.anchor import affected, touched
-from incpt.render.impact.first_sight import CenterHits, rows_columns, widened
+from incpt.render.impact.anchor import affected
+from incpt.render.impact.center_hits import CenterHits, Mask
+from incpt.render.impact.first_sight import rows_columns, widened
 from incpt.render.tiles import TileGrid
 from incpt.scene.model import Scene
 
@@ -40,22 +38,15 @@ class Target:
         """Where `scene` shows other objects, or the same ones edited."""
         return exploration.windows(grid, scene.camera, affected(self.hits.scene, scene))
 
-    def shows(self, now: CenterHits, grid: TileGrid) -> npt.NDArray[np.bool_]:
+    def shows(self, now: CenterHits, grid: TileGrid) -> Mask:
         """(H, W) where it has what is seen `now`: the same thing, which was not edited in between."""
-        old, new = self.hits.scene, now.scene
-        numbers = new.object_index
-        # The last place is that of -1, of no object.
-        common = np.array([numbers.get(obj.name, -2) for obj in old.objects] + [-1], np.int32)
-        is_edited = np.zeros(len(new.objects) + 1, np.bool_)
-        is_edited[[numbers[name] for name in touched(old, new) if name in numbers]] = True
-        reach = _RIM
-        if new.camera.has_lens:
-            reach += exploration.most_blur(grid, new.camera, affected(old, new))
+        camera, reach = now.scene.camera, _RIM
+        if camera.has_lens:
+            reach += exploration.most_blur(grid, camera, affected(self.hits.scene, now.scene))
         found = self.image[..., 3] > 0
-        for window in self.windows(new, grid):
+        for window in self.windows(now.scene, grid):
             inside = rows_columns(_grown(window, reach, grid))
-            before, after = common[self.hits.objects[inside]], now.objects[inside]
-            found[inside] &= ~widened((before != after) | is_edited[after], reach)
+            found[inside] &= ~widened(~self.hits.stays(now, inside), reach)
         return found
 
 

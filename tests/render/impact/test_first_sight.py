@@ -11,7 +11,8 @@ from support.small_scenes import mixed_scene
 
 from incpt.device.device import Device
 from incpt.render.impact import first_sight
-from incpt.render.impact.first_sight import CenterHits, FirstSight
+from incpt.render.impact.center_hits import CenterHits
+from incpt.render.impact.first_sight import FirstSight
 from incpt.render.modes import Mode
 from incpt.render.session import Session
 from incpt.scene.model import Scene

@@ -10,7 +10,8 @@ import pytest
 from support.small_scenes import mixed_scene
 
 from incpt.device.device import Device
-from incpt.render.impact.first_sight import CenterHits, widened
+from incpt.render.impact.center_hits import CenterHits
+from incpt.render.impact.first_sight import widened
 from incpt.render.impact.target import KNOWN, Target
 from incpt.render.session import Session
 from incpt.render.tiles import TileGrid
