@@ -119,13 +119,14 @@ class Progress:
     ) -> Progress:
         """What follows from an edit that made `scene` of `old`, which differ by `change`; see
         `Session.edit`."""
-        if change.is_global:
+        strategy = strategy_of(self.settings)
+        if strategy.starts_over(change):
             return self.entering(self._next_mode(Event.GLOBAL_CHANGE), scene, film)
         changed = affected_objects(old, scene, change)
-        if not changed:
+        if not changed and not change.is_global:
             return self
         mode = self._next_mode(Event.LOCAL_CHANGE)
-        if mode is Mode.INCREMENTAL and strategy_of(self.settings).keeps_anchor:
+        if mode is Mode.INCREMENTAL and strategy.keeps_anchor:
             return self._compared(old, scene, tuple(changed), film, pixel)
         affected = (_affected_locally(since, scene) if since is not None else ()) or tuple(changed)
         return self.entering(mode, scene, film, affected, pixel)
@@ -153,7 +154,7 @@ class Progress:
             kept=none,
             stale=self._stale_after(scene, changed),
         )
-        if not affected:  # The scene is that of the anchor again, and its picture is there.
+        if anchor.looks_like(scene):  # The scene is that of the anchor again, and its picture is there.
             other = replace(other, kept=anchor.worth, anchor=None)
             return other.entering(Mode.REFINE, scene, film)
         return replace(other, anchor=anchor).entering(Mode.INCREMENTAL, scene, film, affected, pixel)

@@ -36,6 +36,7 @@ from incpt.render.modes import Mode
 from incpt.render.plan import CountArray, Cursor, Plan, Queue
 from incpt.render.tiles import BoolArray, IntArray, TileGrid
 from incpt.render.tracer import Tracer
+from incpt.scene.change import Change
 from incpt.scene.model import Placed, Scene
 
 
@@ -123,6 +124,11 @@ class Strategy(ABC):
     uses_nor: ClassVar[bool]
     keeps_picture: ClassVar[bool]
     keeps_anchor: ClassVar[bool] = False
+
+    def starts_over(self, change: Change) -> bool:
+        """Whether nothing of the picture is of use after a change: by default where it affects the whole
+        image alike."""
+        return change.is_global
 
     @abstractmethod
     def order(self, situation: Situation) -> IntArray:

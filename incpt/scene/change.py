@@ -50,7 +50,12 @@ class Change:
     @property
     def is_global(self) -> bool:
         """Whether the whole image is affected alike: camera, environment, or light from far away."""
-        return self.camera or self.environment or self.environment_image or self.far_lights
+        return self.camera or self.surroundings or self.far_lights
+
+    @property
+    def surroundings(self) -> bool:
+        """Whether the environment is another one, or has another image."""
+        return self.environment or self.environment_image
 
     @property
     def is_local(self) -> bool:

@@ -26,17 +26,19 @@ are on the way from vertices and ray to a hit (cl/accel/bvh.cl)."""
 _MOST_PAIRED = 64
 """Boxes of which all pairs are looked at; more are put together by place before."""
 
+_EVERYWHERE = np.array([[-1e30] * 3, [1e30] * 3])
+"""Bounds that every ray crosses."""
+
 Boxes = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """What differs between two scenes with the same camera and the same environment, for the paths of the
-    second.
+    """What differs between two scenes with the same camera, for the paths of the second.
 
     boxes    (N, 2, 3) bounds in world space around objects that are elsewhere, have another shape, or have
              come or gone, where they were and where they are. None where only materials differ. Also around
-             lights that differ in anything, which rays may meet.
+             lights that differ in anything, which rays may meet. All of space where light from far away does.
     objects  (len(objects),) whether it is enough that a path meets the object, whose material is another one.
     lights   whether lights differ: then the scenes need `paired_tables`, which say which of them do.
     padding  of the boxes, per metre of distance from the world's origin.
@@ -92,6 +94,8 @@ def difference(old: Scene, new: Scene) -> Difference:
     placed += [*_changed_around_camera(old, change), *_changed_around_camera(new, change)]
     around = [obj.world_bounds for obj in placed]
     around += [light.world_bounds for scene in (old, new) for light in _met_lights(scene, change.lights)]
+    if change.surroundings or change.far_lights:
+        around = [_EVERYWHERE]
     boxes = np.array(around).reshape(-1, 2, 3)
     padding = _PADDING * max((_amplification(obj) for obj in placed), default=1.0)
     differing = not has_same_emitters(old, new)

@@ -208,14 +208,15 @@ def tables_of(pool: GeometryPool, scene: Scene, previous: SceneTables | None = N
 def paired_tables(
     pool: GeometryPool, old: Scene, new: Scene, previous: SceneTables | None = None
 ) -> tuple[SceneTables, SceneTables]:
-    """The tables of two scenes with the same environment, which choose among the same lights with the same
-    chances; see `light_pairs`. Where their lights are the same anyway these are what `tables_of` gives, else
-    they share all but lights and materials with that. Raises DeviceError."""
+    """The tables of two scenes which choose among the same lights with the same chances; see `light_pairs`.
+    Where their lights are the same anyway these are what `tables_of` gives, and where only one of them has
+    light from an image around, which changes all chances; else they share all but lights and materials with
+    that. Raises DeviceError."""
     first = tables_of(pool, old, previous)
     second = tables_of(pool, new, first)
-    if has_same_emitters(old, new):
+    device, has_image = pool.device, first._has_image_light
+    if has_same_emitters(old, new) or has_image != second._has_image_light:
         return first, second
-    device, has_image = pool.device, _has_image_light(old, first.environment)
     textures = first.textures, second.textures
     pairs = zip((first, second), paired_light_tables(device, old, new, has_image, textures), strict=True)
     before, after = (

@@ -255,11 +255,11 @@ def _starts_over(side: Side, view: View) -> bool:
     if any(getattr(old, name) != getattr(new, name) for name in (*PICTURE_SETTINGS, "tile_size")):
         return True
     change = diff(side.view.scene, view.scene)
-    if change.is_global:
-        return True
-    is_local = bool(affected_objects(side.view.scene, view.scene, change))
     strategy = STRATEGIES_BY_NAME[side.strategy or new.strategy]
-    return is_local and next_mode(side.progress.mode, Event.LOCAL_CHANGE, strategy) is Mode.BASE
+    if strategy.starts_over(change):
+        return True
+    differs = change.is_global or bool(affected_objects(side.view.scene, view.scene, change))
+    return differs and next_mode(side.progress.mode, Event.LOCAL_CHANGE, strategy) is Mode.BASE
 
 
 def _step(state: ViewerState) -> Step | None:

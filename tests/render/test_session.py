@@ -197,10 +197,15 @@ def test_edit_during_incremental_starts_a_new_spiral(device: Device) -> None:
 
 
 @pytest.mark.parametrize(
-    "edit", [lambda s: s.with_camera(fov_y=50.0), lambda s: s.with_environment(intensity=1.0)]
+    ("edit", "strategy"),
+    [
+        (lambda s: s.with_camera(fov_y=50.0), "impact"),
+        (lambda s: s.with_camera(fov_y=50.0), "spiral"),
+        (lambda s: s.with_environment(intensity=1.0), "spiral"),
+    ],
 )
-def test_global_change_starts_over(device: Device, edit) -> None:
-    session = rendered(device, mixed_scene(slots_per_step=8), 2)
+def test_global_change_starts_over(device: Device, edit, strategy: str) -> None:
+    session = rendered(device, mixed_scene(slots_per_step=8, strategy=strategy), 2)
     before = session.image()
     session.edit(edit(session.scene))
     assert session.mode is Mode.BASE and not session.spp().any()

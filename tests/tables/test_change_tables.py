@@ -13,6 +13,7 @@ from support.small_scenes import mixed_scene
 
 from incpt.benchmarks.kit.scenes import crowd, icosphere
 from incpt.core import layout
+from incpt.scene.light import Light
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
@@ -73,9 +74,23 @@ def test_a_hit_is_enough_where_only_the_material_is_another_one() -> None:
 
 def test_what_no_path_can_meet_is_no_difference() -> None:
     old = mixed_scene()
-    for new in (old, mixed_scene(), old.with_material("unused", metallic=1.0), old.with_material("red")):
+    alike = replace(mixed_scene(), environment=old.environment)
+    for new in (old, alike, old.with_material("unused", metallic=1.0), old.with_material("red")):
         assert difference(old, new).is_empty
     assert difference(Scene(), Scene()).is_empty
+
+
+@pytest.mark.parametrize("far", [False, True], ids=["environment", "sun"])
+def test_every_path_meets_light_from_far_away(far: bool) -> None:
+    sun = Light("sun", "sun", irradiance=1.0)
+    old = mixed_scene().with_added_light(sun)
+    new = old.with_light("sun", irradiance=2.0) if far else old.with_environment(rotation_y=10.0)
+    found = difference(old, new)
+    assert len(found.boxes) == 1 and found.lights == far and not found.objects.any()
+    row = change_row(found)
+    assert (row["least"][:2] < -1e29).all() and (row["greatest"][:2] > 1e29).all()
+    moved = difference(old, new.with_object("red cube", position=(1, 1, -7)))
+    assert len(moved.boxes) == 1, "that box holds all others"
 
 
 def test_the_row_of_a_change() -> None:

@@ -91,7 +91,8 @@ def test_wakes_the_window_and_keeps_the_latest_frame_only(device: Device) -> Non
 
 def test_answers_requests(renderer: ThreadedRenderer, tmp_path: Path) -> None:
     renderer.request(Pick((0.5, 0.5), additive=True))
-    renderer.show(View(mixed_scene(), target_spp=2))
+    scene = mixed_scene()
+    renderer.show(View(scene, target_spp=2))
     assert wait_for(renderer, Picked) == Picked((0.5, 0.5), "red cube", True)
     renderer.request(Pick((0.0, 0.0)))
     assert wait_for(renderer, Picked) == Picked((0.0, 0.0), None, False)
@@ -100,7 +101,7 @@ def test_answers_requests(renderer: ThreadedRenderer, tmp_path: Path) -> None:
     renderer.request(Export(tmp_path / "a.exr", aovs=True))
     assert wait_for(renderer, Exported) == Exported(tmp_path / "a.exr")
     assert (tmp_path / "a.exr").stat().st_size > 1000
-    renderer.show(View(mixed_scene(), target_spp=3))
+    renderer.show(View(scene, target_spp=3))
     wait_for(renderer, Frame, lambda frame: frame.resting and frame.view.target_spp == 3)
     renderer.request(Pin(True))
     frame = wait_for(renderer, Frame, lambda frame: frame.resting and frame.pictures[0].error == 0)

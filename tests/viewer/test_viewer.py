@@ -195,7 +195,7 @@ def test_camera_moves_in_previews_and_rests_at_full_resolution(
 
 
 def test_end_of_a_drag_of_the_environment_returns_at_once(make_viewer: MakeViewer) -> None:
-    scene = mixed_scene()
+    scene = mixed_scene(strategy="spiral")
     viewer, clock = make_viewer(view_of(scene))
     run_to(
         viewer, view_of(scene), lambda frame: frame.pictures[0].tile_spp.min() > 0 and not frame.is_preview

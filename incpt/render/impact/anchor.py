@@ -12,7 +12,11 @@ from dataclasses import dataclass
 
 from incpt.render.plan import CountArray
 from incpt.scene.change import affected_objects, diff
+from incpt.scene.light import Light
 from incpt.scene.model import Placed, Scene
+
+SURROUNDINGS = ""
+"""The environment, among names of objects, which have at least a letter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,12 +26,18 @@ class Anchor:
     scene: Scene
     worth: CountArray
 
+    def looks_like(self, scene: Scene) -> bool:
+        """Whether `scene` gives the same picture."""
+        change = diff(self.scene, scene)
+        return not change.is_global and not affected_objects(self.scene, scene, change)
+
     def affected(self, scene: Scene) -> tuple[Placed, ...]:
-        """The objects and lights that look different in `scene`, as they are here and as they are there."""
+        """The objects and lights that look different in `scene`, as they are here and as they are there,
+        without those that are far away."""
         return affected(self.scene, scene)
 
     def touched(self, scene: Scene) -> frozenset[str]:
-        """The names of the objects and lights that differ in `scene`, or that wear a material that does."""
+        """See `touched`."""
         return touched(self.scene, scene)
 
     def serves(self, scene: Scene, edited: Scene) -> bool:
@@ -37,12 +47,16 @@ class Anchor:
 
 
 def affected(old: Scene, new: Scene) -> tuple[Placed, ...]:
-    """The objects and lights that look different in both scenes, as they are in each."""
-    return tuple(affected_objects(old, new, diff(old, new)))
+    """The objects and lights that look different in both scenes, as they are in each, without those that are
+    far away."""
+    found = affected_objects(old, new, diff(old, new))
+    return tuple(one for one in found if not (isinstance(one, Light) and one.is_far))
 
 
 def touched(old: Scene, new: Scene) -> frozenset[str]:
-    """The names of the objects and lights that differ, or that wear a material that does."""
+    """The names of the objects and lights that differ, or that wear a material that does; and SURROUNDINGS,
+    if they differ."""
     change = diff(old, new)
     wearing = {obj.name for scene in (old, new) for obj in scene.objects if obj.material in change.materials}
-    return change.objects | change.lights | wearing
+    around = {SURROUNDINGS} if change.surroundings else set()
+    return change.objects | change.lights | wearing | around

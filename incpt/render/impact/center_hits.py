@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.render.film import Float32Array
-from incpt.render.impact.anchor import touched
+from incpt.render.impact.anchor import SURROUNDINGS, touched
 from incpt.scene.model import Scene
 
 Mask = npt.NDArray[np.bool_]
@@ -31,7 +31,9 @@ class CenterHits:
         # The last place is that of -1, of no object.
         common = np.array([numbers.get(obj.name, -2) for obj in self.scene.objects] + [-1], np.int32)
         is_edited = np.zeros(len(now.scene.objects) + 1, np.bool_)
-        is_edited[[numbers[name] for name in touched(self.scene, now.scene) if name in numbers]] = True
+        edited = touched(self.scene, now.scene)
+        is_edited[[numbers[name] for name in edited if name in numbers]] = True
+        is_edited[-1] = SURROUNDINGS in edited
         then, objects = common[self.objects[inside]], now.objects[inside]
         stays: Mask = (then == objects) & ~is_edited[objects]
         return stays

@@ -11,7 +11,7 @@ from incpt.core.settings import RenderSettings
 from incpt.device.device import Device
 from incpt.render.film import Film, Float32Array
 from incpt.render.first_hits import Window, first_hits
-from incpt.render.impact.anchor import Anchor
+from incpt.render.impact.anchor import SURROUNDINGS, Anchor
 from incpt.render.impact.center_hits import CenterHits
 from incpt.render.impact.estimator import Estimator, SeenPair
 from incpt.render.impact.exploration import most_blur, windows
@@ -179,7 +179,11 @@ def _seen_pair(anchor: Anchor, old: CenterHits, new: CenterHits, seen: list[Wind
     common = np.array([number[obj.name] for obj in new.scene.objects] + [-1], np.int32)
     differs = np.zeros(len(number) + 1, np.bool_)
     # Lights are nothing that pixels show: rays through their centres go on to what is behind.
-    differs[[number[name] for name in anchor.touched(new.scene) if name in number]] = True
+    touched = anchor.touched(new.scene)
+    differs[[number[name] for name in touched if name in number]] = True
+    if SURROUNDINGS in touched:
+        height, width = old.objects.shape
+        differs[-1], seen = True, [(0, 0, width, height)]
     # Outside of the windows both scenes show the same.
     labels = _label(old.objects, old.objects)
     changed = np.zeros(labels.shape, np.bool_)

@@ -22,6 +22,7 @@ from incpt.render.plan import CountArray, Queue
 from incpt.render.strategy import Situation, Step, Strategy
 from incpt.render.tiles import IntArray
 from incpt.render.tracer import Tracer
+from incpt.scene.change import Change
 
 FIRST_ROUND = 0.34
 """Paths of the shortest round of allocation, as a share of one path for each pixel."""
@@ -47,6 +48,10 @@ class Impact(Strategy):
     keeps_picture = True
     keeps_anchor = True
     planes = (PAIR_SUMS,)
+
+    def starts_over(self, change: Change) -> bool:
+        """Light from far away can be compared as well; only another view shows other points."""
+        return change.camera
 
     def order(self, situation: Situation) -> IntArray:
         """Row by row, where the scene is compared with no other."""

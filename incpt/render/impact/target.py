@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from incpt.render.film import Float32Array
 from incpt.render.first_hits import Window
 from incpt.render.impact import exploration
-from incpt.render.impact.anchor import affected
+from incpt.render.impact.anchor import SURROUNDINGS, affected, touched
 from incpt.render.impact.center_hits import CenterHits, Mask
 from incpt.render.impact.first_sight import rows_columns, widened
 from incpt.render.tiles import TileGrid
@@ -44,7 +44,10 @@ class Target:
         if camera.has_lens:
             reach += exploration.most_blur(grid, camera, affected(self.hits.scene, now.scene))
         found = self.image[..., 3] > 0
-        for window in self.windows(now.scene, grid):
+        whole = (
+            [(0, 0, grid.width, grid.height)] if SURROUNDINGS in touched(self.hits.scene, now.scene) else []
+        )
+        for window in whole or self.windows(now.scene, grid):
             inside = rows_columns(_grown(window, reach, grid))
             found[inside] &= ~widened(~self.hits.stays(now, inside), reach)
         return found

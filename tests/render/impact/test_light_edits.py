@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from support.law import LARGE_STEPS
 from support.pairs import assert_choice_changes_no_mean, check, traced_pairs
 from support.renders import repeat
-from support.small_scenes import mixed_scene
+from support.small_scenes import mixed_scene, sky
 
 from incpt.benchmarks.kit.scenes import cornell
 from incpt.core.settings import RenderSettings
@@ -25,6 +25,7 @@ from incpt.scene.change import diff
 from incpt.scene.edits import unique_name
 from incpt.scene.light import Light
 from incpt.scene.model import Scene
+from incpt.scene.sky import Sky
 
 SMALL = RenderSettings(size=(44, 28), tile_size=8, max_bounces=3)
 DOWN = (-90, 0, 0)
@@ -99,6 +100,15 @@ EDITS = [
     Edit("room: pane", room, lambda s: s.with_light("pane", radiance=9)),
     Edit("room: block", room, lambda s: s.with_object("short", position=(0.3, 0.3, 0.4)), 0.6),
     Edit("room: all go", room, lambda s: replace(s, lights=())),
+    Edit("turn a sun", mixed, lambda s: s.with_light("sun", rotation=(-60, -50, 0))),
+    Edit("brighter sun", mixed, lambda s: s.with_light("sun", irradiance=3)),
+    Edit("sun goes", mixed, lambda s: s.without_light("sun")),
+    Edit("turn the image", mixed, lambda s: s.with_environment(rotation_y=70)),
+    Edit("dim the image", mixed, lambda s: s.with_environment(intensity=0.2)),
+    Edit("image goes", mixed, lambda s: s.with_environment(image=None, color=(0.2, 0.3, 0.4))),
+    Edit("dark image", mixed, lambda s: s.with_environment(intensity=0.0)),
+    Edit("a sky", mixed, lambda s: s.with_environment(image=None, sky=Sky(35.0), intensity=0.05)),
+    Edit("room: image", room, lambda s: s.with_environment(image=sky(), color=(1, 1, 1))),
     Edit("alone: ball", alone, lambda s: s.with_light("bulb", position=(0.2, 1.1, 0.3), power=7)),
     Edit("alone: first triangles", alone, lambda s: s.with_material("lamp", emission=(17, 12, 4))),
 ]  # fmt: skip
@@ -158,7 +168,13 @@ def test_lights_of_two_scenes_bring_what_those_of_each_bring(name: str, device: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["move a ball", "turn a spot", "add", "room: pane", "another kind"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("move a ball", "turn a spot", "add", "room: pane", "another kind", "turn a sun", "sun goes"),
+        *("turn the image", "image goes", "dark image", "a sky"),
+    ],
+)
 def test_edits_then_convergence_equal_a_fresh_render(name: str, device: Device) -> None:
     edit = next(one for one in EDITS if one.name == name)
     old = edit.scene()
@@ -166,7 +182,7 @@ def test_edits_then_convergence_equal_a_fresh_render(name: str, device: Device) 
     settings = replace(SMALL, size=(20, 14), base_nor=16, strategy="impact")
     session = Session(old, settings=settings, device=device)
     session.render(64)
-    assert diff(old, new).is_local
+    assert not diff(old, new).camera
     session.edit(new)
     assert session.mode is Mode.INCREMENTAL
     session.step()
@@ -212,6 +228,14 @@ goings = st.builds(
     lambda name: lambda s: s.without_light(name) if name in s.light_index else s,
     st.sampled_from(["bulb", "pane"]),
 )
+surroundings = st.builds(
+    lambda values: lambda s: s.with_environment(**values),
+    st.fixed_dictionaries({"rotation_y": st.floats(-180, 180), "intensity": st.floats(0, 1)}),
+)
+suns = st.builds(
+    lambda values: lambda s: s.with_light("sun", **values),
+    st.fixed_dictionaries({"rotation": st.tuples(*[st.floats(-90, 90)] * 3), "irradiance": st.floats(0, 2)}),
+)
 moves = st.builds(lambda at: lambda s: s.with_object("red cube", position=at), places)
 
 
@@ -223,7 +247,10 @@ moves = st.builds(lambda at: lambda s: s.with_object("red cube", position=at), p
 )
 @given(
     st.lists(
-        st.tuples(st.one_of(light_edits, light_edits, comings, goings, moves), st.integers(0, 4)),
+        st.tuples(
+            st.one_of(light_edits, light_edits, comings, goings, moves, surroundings, suns),
+            st.integers(0, 4),
+        ),
         min_size=1,
         max_size=4,
     )
@@ -243,10 +270,48 @@ def test_any_edits_then_convergence_equal_a_fresh_render(
     assert_converges(session, scene)
 
 
-def test_edits_of_suns_start_over(device: Device) -> None:
-    session = Session(mixed(), device=device)
-    session.render(1)
-    session.edit(session.scene.with_light("sun", irradiance=2))
+@pytest.mark.parametrize("name", ["dim the image", "brighter sun"])
+def test_another_intensity_is_found_at_once(device: Device, name: str) -> None:
+    """Both scenes bring the same but for a factor."""
+    scene = replace(mixed(), lights=(LAMPS[-1],)) if name == "brighter sun" else replace(mixed(), lights=())
+    scene = scene.with_material("lamp", emission=(0, 0, 0))
+    scene = scene.with_environment(intensity=0.0) if name == "brighter sun" else scene
+    edited = next(edit for edit in EDITS if edit.name == name).apply(scene)
+    settings = replace(SMALL, strategy="impact", base_nor=16)
+    session = Session(scene, settings=settings, device=device)
+    session.render(512)
+    truth = repeat(replace(edited), 256, 4, size=SMALL.size, max_bounces=3).mean(axis=0)
+    once = replace(settings, strategy="restart", base_nor=1)
+    fresh = Session(replace(edited), settings=once, device=device)
+    fresh.render(1)
+    before = session.image()
+    session.edit(edited)
+    spent = 0
+    while spent < 2 * SMALL.size[0] * SMALL.size[1]:
+        report = session.step()
+        spent += report.paths + report.partners
+    errors = [
+        float(np.sqrt(((image - truth) ** 2).mean())) for image in (session.image(), before, fresh.image())
+    ]
+    assert errors[0] < 0.25 * min(errors[1:])
+
+
+def test_another_image_around_does_not_wait(device: Device) -> None:
+    scene = mixed()
+    session = Session(scene, settings=replace(SMALL, strategy="impact"), device=device)
+    session.render(4)
+    session.edit(scene.with_environment(rotation_y=70))
+    assert session.mode is Mode.INCREMENTAL and session.error_left() == 1.0
+    turned = session.scene
+    session.step()
+    session.edit(turned.with_environment(rotation_y=90))
+    anchor = session.progress.anchor
+    assert anchor is not None and anchor.scene is scene, "turned on and on it keeps the anchor"
+    session.step()
+    session.edit(session.scene.with_object("red cube", position=(0.2, 0.5, 0.1)))
+    anchor = session.progress.anchor
+    assert anchor is not None and anchor.scene is not scene, "another edit folds the picture"
+    session.edit(session.scene.with_camera(fov_y=30.0))
     assert session.mode is Mode.BASE
 
 

@@ -178,14 +178,15 @@ AFTER: dict[str, tuple[Callable[[Desk], object], Mode]] = {
     "orbit": (orbit, BASE),
     "wheel": (wheel, BASE),
     "frame selected": (command("Frame selected"), BASE),
-    "environment intensity": (typed("Scene", "Intensity", "2"), BASE),
-    "environment turned": (typed("Scene", "Turn", "90"), BASE),
-    "environment image": (lambda user: (user.panel("Scene"), user.click("Remove##image")), BASE),
     "width": (typed("Render", "Width", "40"), BASE),
     "resolution": (typed("Render", "Resolution", "50"), BASE),
     "bounces": (typed("Render", "Bounces", "1"), BASE),
     "seed": (typed("Render", "Seed", "7"), BASE),
     "restart": (command("Restart"), BASE),
+    # All of it too, but compared with what is there.
+    "environment intensity": (typed("Scene", "Intensity", "2"), INCREMENTAL),
+    "environment turned": (typed("Scene", "Turn", "90"), INCREMENTAL),
+    "environment image": (lambda user: (user.panel("Scene"), user.click("Remove##image")), INCREMENTAL),
     # A part of it: where the edit is, first.
     "position typed": (typed("Object", "Position X", "0.3"), INCREMENTAL),
     "gizmo": (gizmo, INCREMENTAL),
