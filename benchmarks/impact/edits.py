@@ -18,6 +18,7 @@ from incpt.formats import registry
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
+from incpt.scene.texture import Bitmap, Texture
 
 
 @dataclass(frozen=True)
@@ -115,6 +116,15 @@ def _two_moved(scene: Scene) -> Scene:
     return scene.with_object("gold ball", position=(1.6, 0.4, -0.4))
 
 
+def _boarded(scene: Scene) -> Scene:
+    """The red cube wears a texture of light and dark boards."""
+    across = np.arange(64)
+    shades = np.where(across % 16 < 2, 60, 150 + 30 * (across // 16 % 2)).astype(np.uint8)
+    boards = np.stack([shades, shades * 0.7, shades * 0.4, np.full(64, 255)], axis=-1)
+    image = Bitmap(np.broadcast_to(boards.astype(np.uint8), (64, 64, 4)).copy())
+    return scene.with_material("red", base_color=(1.0, 1.0, 1.0), base_color_texture=Texture(image))
+
+
 def _liquids(scene: Scene) -> Scene:
     for priority, absorption in (("lower", (30, 8, 12)), ("equal", (6, 24, 10)), ("higher", (18, 18, 4))):
         scene = scene.with_material(f"liquid of {priority} priority", absorption=absorption)
@@ -194,6 +204,13 @@ EDITS = {
         "editing", "gold ball to cube", lambda scene: scene.with_object("gold ball", mesh=shape("cube"))
     ),
     "liquids": SceneEdit("nested", "nested: recolour three liquids", _liquids),
+    "texture": SceneEdit("editing", "boards on red cube", _boarded),
+    "brighten": SceneEdit(
+        "editing", "brighter environment", lambda scene: scene.with_environment(intensity=0.6), local=False
+    ),
+    "turn": SceneEdit(
+        "editing", "turn environment", lambda scene: scene.with_environment(rotation_y=215.0), local=False
+    ),
 }
 """By name; in the order of the tables."""
 
