@@ -11,6 +11,7 @@ from reference.markdown import code, table
 _READERS = {
     "gltf.reader": "glTF 2.0, by a reader of our own",
     "obj.reader": "OBJ with MTL, by a reader of our own",
+    "ply.reader": "by a reader of our own",
     "trimesh_adapter": "by trimesh",
     "mesh_store": "meshes that incpt itself writes beside a scene file",
     "images": "environments and, in scene files, textures",

@@ -28,14 +28,15 @@ def usable_mesh(
     attributes: VertexAttributes = NO_ATTRIBUTES,
     normal_at: npt.NDArray[np.int64] | None = None,
     uv_at: npt.NDArray[np.int64] | None = None,
+    color_at: npt.NDArray[np.int64] | None = None,
 ) -> Mesh | None:
     """A mesh of the faces that can be rendered, or None if there is none.
 
     `vertices` (V, 3), `faces` (F, 3) and `normals` (V, 3) at the vertices, of any length, or None for flat
     faces, and `attributes` may hold whatever a damaged file does. `counts` gets, by the words of a message,
-    how many faces were left out, and under "in all" how many there were. `normal_at` and `uv_at` (F, 3) are
-    the places of corners in normals and texture coordinates where they are others than those of their
-    vertices. Raises InputError: arrays of other shapes.
+    how many faces were left out, and under "in all" how many there were. `normal_at`, `uv_at` and `color_at`
+    (F, 3) are the places of corners in normals, texture coordinates and colours where they are others than
+    those of their vertices. Raises InputError: arrays of other shapes.
     """
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
         raise InputError("has vertices without three coordinates; the file is damaged")
@@ -51,11 +52,12 @@ def usable_mesh(
         faces = faces[usable]
         normal_at = None if normal_at is None else normal_at[usable]
         uv_at = None if uv_at is None else uv_at[usable]
+        color_at = None if color_at is None else color_at[usable]
     corner_normals = None
     if normals is not None:
         places = faces if normal_at is None else normal_at
         corner_normals = handed_over(_corner_normals(stored, faces, normals, places))
-    at_corners = attributes.at_corners(faces, uv_at)
+    at_corners = attributes.at_corners(faces, uv_at, color_at)
     return Mesh(handed_over(stored), handed_over(faces.astype(np.int32)), corner_normals, **at_corners)
 
 

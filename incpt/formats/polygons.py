@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import mapbox_earcut
@@ -15,7 +16,9 @@ MOST_CORNERS = 1 << 16
 """Larger polygons become fans: cutting ears takes the square of their corners in the worst case."""
 
 
-def triangulated(sizes: Indices, vertices: Array, corners: npt.NDArray[np.signedinteger[Any]]) -> Indices:
+def triangulated(
+    sizes: Indices, vertices: npt.NDArray[np.floating[Any]], corners: npt.NDArray[np.signedinteger[Any]]
+) -> Indices:
     """(T, 3) the triangles of polygons as numbers of their corners, polygon by polygon. `sizes` (P,) are
     their corners; those with fewer than three have no triangle. `corners` (C,) are their places in `vertices`
     (V, 3), polygon after polygon; what is not finite is allowed.
@@ -23,6 +26,8 @@ def triangulated(sizes: Indices, vertices: Array, corners: npt.NDArray[np.signed
     Convex polygons become fans around their first corner, concave ones have their ears cut off, so that no
     notch is filled. All triangles wind as their polygon does.
     """
+    if (sizes == 3).all():
+        return np.arange(3 * len(sizes)).reshape(-1, 3)
     first = np.cumsum(sizes) - sizes
     found, order = [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)]
     for size in np.unique(sizes[sizes >= 3]):
@@ -30,7 +35,7 @@ def triangulated(sizes: Indices, vertices: Array, corners: npt.NDArray[np.signed
         starts = first[chosen]
         triangles = _fans(int(size))[None] + starts[:, None, None]
         if size > 3:
-            outlines = vertices[corners[starts[:, None] + np.arange(size)]]
+            outlines = vertices[corners[starts[:, None] + np.arange(size)]].astype(np.float64, copy=False)
             for place in np.flatnonzero(~_convex(outlines)):
                 cut = _cut(outlines[place])
                 if cut is not None:
@@ -38,6 +43,36 @@ def triangulated(sizes: Indices, vertices: Array, corners: npt.NDArray[np.signed
         found.append(triangles.reshape(-1, 3))
         order.append(chosen.repeat(size - 2))
     return np.concatenate(found)[np.argsort(np.concatenate(order), kind="stable")]
+
+
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """Polygons of a file as triangles: `faces` (T, 3), the places of their corners in the vertices, -1 for
+    all of a polygon that has one which is not there; `corners` (T, 3), their numbers among those of all
+    polygons; `polygons` (T,), the number of the polygon of each; and how many polygons had fewer than three
+    corners."""
+
+    faces: Indices
+    corners: Indices
+    polygons: Indices
+    too_small: int = 0
+
+
+def triangles_of(sizes: Indices, vertices: npt.NDArray[np.floating[Any]], corners: Indices) -> Triangles:
+    """The triangles of polygons with so many corners (P,) each, of which `corners` (C,) are the places in
+    vertices (V, 3), whatever a damaged file has there."""
+    is_there = (corners >= 0) & (corners < len(vertices))
+    if not is_there.all():
+        corners = np.where(is_there, corners, len(vertices))
+        vertices = np.concatenate([vertices, np.full((1, 3), np.nan, vertices.dtype)])
+    numbers = triangulated(sizes, vertices, corners)
+    polygons = np.repeat(np.arange(len(sizes)), np.maximum(sizes - 2, 0))
+    faces = corners[numbers]
+    if not is_there.all():
+        is_bad = np.zeros(len(sizes), bool)
+        is_bad[np.repeat(np.arange(len(sizes)), sizes)[~is_there]] = True
+        faces[is_bad[polygons]] = -1
+    return Triangles(faces, numbers, polygons, int((sizes < 3).sum()))
 
 
 def _fans(size: int) -> Indices:

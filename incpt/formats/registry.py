@@ -75,7 +75,7 @@ FORMATS = (
     Format(".gltf", FileKind.MESH, _GLTF, says_units=True),
     Format(".obj", FileKind.MESH, ("obj.reader", "read_obj")),
     Format(".off", FileKind.MESH, _TRIMESH),
-    Format(".ply", FileKind.MESH, _TRIMESH),
+    Format(".ply", FileKind.MESH, ("ply.reader", "read_ply")),
     Format(".stl", FileKind.MESH, _TRIMESH),
     Format(".3mf", FileKind.MESH, _TRIMESH, needs=("lxml", "networkx")),
     Format(".dae", FileKind.MESH, _TRIMESH, needs=("collada",)),

@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 from incpt.core.arrays import handed_over
 from incpt.scene.checks import LARGEST
+from incpt.scene.material import Material
+from incpt.scene.mesh import Mesh
 
 Array = npt.NDArray[np.floating[Any]]
 
@@ -33,10 +35,13 @@ class VertexAttributes:
         return replace(self, tangents=np.concatenate([along, side], axis=1))
 
     def at_corners(
-        self, faces: npt.NDArray[np.int64], uv_at: npt.NDArray[np.int64] | None = None
+        self,
+        faces: npt.NDArray[np.int64],
+        uv_at: npt.NDArray[np.int64] | None = None,
+        color_at: npt.NDArray[np.int64] | None = None,
     ) -> dict[str, Any]:
-        """The keywords of a Mesh for faces (F, 3). `uv_at` (F, 3): where their texture coordinates stand, if
-        not at the vertices. Numbers that are not finite become 0."""
+        """The keywords of a Mesh for faces (F, 3). `uv_at` and `color_at` (F, 3): where their texture
+        coordinates and their colours stand, if not at the vertices. Numbers that are not finite become 0."""
         places = faces if uv_at is None else uv_at
 
         def at(values: Array, where: npt.NDArray[np.int64] = faces) -> Array:
@@ -44,13 +49,24 @@ class VertexAttributes:
 
         keywords: dict[str, Any] = {"uvs": tuple(at(_within(uv, LARGEST), places) for uv in self.uvs)}
         if self.colors is not None:
-            keywords["colors"] = at(np.clip(_within(self.colors, LARGEST), 0, 1))
+            colors = np.clip(_within(self.colors, LARGEST), 0, 1)
+            keywords["colors"] = at(colors, faces if color_at is None else color_at)
         if self.tangents is not None:
             keywords["tangents"] = at(_unit_tangents(self.tangents))
         return keywords
 
 
 NO_ATTRIBUTES = VertexAttributes()
+
+
+def material_of_colors(mesh: Mesh) -> tuple[str, Material] | tuple[None, None]:
+    """The name and the material of a mesh whose file has colours for it and no material: they are its own
+    colours then, and cover as much as they say."""
+    if mesh.colors is None:
+        return None, None
+    is_opaque = bool((mesh.colors[..., 3] == 1).all())
+    mode = "opaque" if is_opaque else "blend"
+    return "colors", Material(base_color=(1.0, 1.0, 1.0), roughness=0.6, alpha_mode=mode)
 
 
 def _within(values: Array, largest: float) -> Array:

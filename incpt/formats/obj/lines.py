@@ -7,7 +7,6 @@ reads the numbers of neighbours at once; where anything is odd, lines are read o
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -16,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core.errors import InputError
+from incpt.formats.text_numbers import number_or_nan, numbers_at_once, words_in_lines
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
@@ -212,40 +212,19 @@ def _kinds(buffer: npt.NDArray[np.uint8], starts: Indices, ends: Indices) -> npt
     return kinds
 
 
-def _words_in_lines(piece: bytes, lines: int) -> Indices:
-    """(lines,) how many words each line has."""
-    buffer = np.frombuffer(piece + b"\n", np.uint8)
-    is_word = buffer > _SPACE
-    begins = is_word.copy()
-    begins[1:] &= ~is_word[:-1]
-    before = np.searchsorted(np.flatnonzero(begins), np.flatnonzero(buffer == _NEWLINE))
-    assert len(before) == lines, "a piece has as many lines as it is said to have"
-    return np.diff(before, prepend=0)
-
-
 def _numbers(piece: bytes, lines: int) -> Array:
     """(lines, n) the numbers of each line, NaN where it has fewer, or what is none."""
-    words = _words_in_lines(piece, lines)
+    words = words_in_lines(piece, lines)
     width = int(words.max(initial=0))
     if width == 0 or (words == width).all():
-        numbers = _read(piece, np.float64)
+        numbers = numbers_at_once(piece)
         if len(numbers) == width * lines:
             return numbers.reshape(lines, width)
     result = np.full((lines, width), np.nan)
     for row, line in zip(result, piece.split(b"\n"), strict=True):
         fields = line.split()
-        row[: len(fields)] = [_number(word) for word in fields]
+        row[: len(fields)] = [number_or_nan(word) for word in fields]
     return result
-
-
-def _read(text: bytes, dtype: type) -> npt.NDArray[Any]:
-    """The numbers of a text; fewer, where one is none."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)
-        try:
-            return np.fromstring(text, dtype, sep=" ")
-        except ValueError:  # from numpy 2.3 on
-            return np.zeros(0, dtype)
 
 
 def _said(found: ObjText, state: State, words: list[bytes]) -> State:
@@ -273,13 +252,6 @@ def _said(found: ObjText, state: State, words: list[bytes]) -> State:
     return state
 
 
-def _number(word: bytes) -> float:
-    try:
-        return float(word)
-    except ValueError:
-        return float("nan")
-
-
 def _fitted(numbers: Array, width: int) -> Array:
     """(lines, width): more numbers are left away, and of texture coordinates a missing one is 0."""
     if numbers.shape[1] < width:
@@ -300,7 +272,7 @@ def _colors_of(numbers: Array) -> Array:
 def _faces(found: ObjText, piece: bytes, totals: Indices) -> tuple[Indices, Corners]:
     """Sizes and corners of faces, see FaceRun. `totals` (lines, 3): how many of each kind of vertex stand
     before the line of each."""
-    sizes = _words_in_lines(piece, len(totals))
+    sizes = words_in_lines(piece, len(totals))
     written = _corners(piece, int(sizes.sum()), found.unreadable)
     totals = np.repeat(totals, sizes, axis=0)
     corners = np.where(written > 0, written - 1, written + totals)
@@ -323,7 +295,7 @@ def _corners(piece: bytes, count: int, unreadable: list[str]) -> Indices:
         return result
     columns = _WAYS.get((piece.count(b"/") / count, piece.count(b"//") / count))
     if columns is not None:
-        numbers = _read(piece.replace(b"/", b" "), np.int64)
+        numbers = numbers_at_once(piece.replace(b"/", b" "), np.int64)
         if len(numbers) == len(columns) * count:
             result[:, columns] = numbers.reshape(count, -1)
             return result

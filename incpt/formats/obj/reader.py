@@ -22,8 +22,9 @@ from incpt.formats.obj.lines import IMPOSSIBLE, NOWHERE, ObjText, State, decoded
 from incpt.formats.obj.mtl import MaterialLibrary
 from incpt.formats.outside import check_inside
 from incpt.formats.polygons import triangulated
-from incpt.formats.vertex_attributes import VertexAttributes
+from incpt.formats.vertex_attributes import VertexAttributes, material_of_colors
 from incpt.picture.color import linear_from_srgb
+from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh, MeshSource
 from incpt.scene.mesh_part import MeshFile, MeshPart
 
@@ -55,13 +56,22 @@ def read_obj(path: Path) -> MeshFile:
             MeshPart(
                 name if len(found) > 1 else None,
                 replace(mesh, source=replace(source, part=name) if len(found) > 1 else source),
-                material or None,
-                library.materials.get(material),
+                *_material(library, material, mesh),
             )
             for name, material, mesh in found
         ),
         files=tuple(library.files),
     )
+
+
+def _material(
+    library: MaterialLibrary, name: str, mesh: Mesh
+) -> tuple[str, Material] | tuple[str | None, None]:
+    """The name and the material of faces under a name of one."""
+    material = library.materials.get(name)
+    if material is not None:
+        return name, material
+    return (name, None) if name else material_of_colors(mesh)
 
 
 def _part_of(state: State) -> tuple[str, str]:
