@@ -11,6 +11,7 @@ from incpt.core.arrays import handed_over
 from incpt.core.errors import InputError
 from incpt.formats import import_report
 from incpt.formats.vertex_attributes import NO_ATTRIBUTES, VertexAttributes
+from incpt.formats.welding import mixed, position_hashes
 from incpt.scene.checks import LARGEST
 from incpt.scene.mesh import Mesh
 
@@ -134,24 +135,13 @@ def _repeated(
 
 def _hashes(vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int64]) -> npt.NDArray[np.uint64]:
     """(F,) the same for faces with the same positions in the same order, wherever it begins."""
-    # Adding zero makes one of the two zeros.
-    with np.errstate(invalid="ignore"):
-        bits = (vertices + np.float32(0)).view(np.uint32).astype(np.uint64)
-    of_vertices = _mixed(_mixed(_mixed(bits[:, 0]) + bits[:, 1]) + bits[:, 2])
+    of_vertices = position_hashes(vertices)
     found = np.empty(len(faces), np.uint64)
     for first in range(0, len(faces), _PIECE):
         corners = of_vertices[faces[first : first + _PIECE]]
-        edges = _mixed(corners + np.uint64(3) * np.roll(corners, 1, axis=1))
+        edges = mixed(corners + np.uint64(3) * np.roll(corners, 1, axis=1))
         found[first : first + _PIECE] = edges.sum(axis=1)
     return found
-
-
-def _mixed(values: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
-    """SplitMix64's finalizer (Steele, Lea and Flood 2014)."""
-    values = (values ^ (values >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    values = (values ^ (values >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    mixed: npt.NDArray[np.uint64] = values ^ (values >> np.uint64(31))
-    return mixed
 
 
 def _again(corners: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from incpt.core.errors import InputError
 from incpt.scene.mesh import Mesh, MeshSource
+from incpt.scene.transform import IDENTITY, Transform
 
 Array = npt.NDArray[np.floating[Any]]
+
+_SAME = 1e-9
+"""Matrices that differ by less of their largest number are the same placement."""
 
 
 def cofactors(linear: Array) -> npt.NDArray[np.float64]:
@@ -17,6 +23,19 @@ def cofactors(linear: Array) -> npt.NDArray[np.float64]:
     for flat placements too."""
     x, y, z = np.asarray(linear, np.float64).T
     return np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=1)
+
+
+def transform_of(matrix: npt.NDArray[np.float64]) -> Transform | None:
+    """The placement by a (4, 4) matrix; None where it flattens, or is so large that no object can have it."""
+    if np.array_equal(matrix, np.eye(4)):
+        return IDENTITY
+    try:
+        kept = Transform.from_matrix(matrix)
+        plain = replace(kept, matrix=None)
+    except (InputError, np.linalg.LinAlgError):
+        return None
+    difference = np.abs(plain.world_from_object - kept.world_from_object).max()
+    return plain if difference <= _SAME * np.abs(matrix).max() else kept
 
 
 def placed_arrays(

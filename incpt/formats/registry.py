@@ -74,10 +74,10 @@ FORMATS = (
     Format(".glb", FileKind.MESH, _GLTF, says_units=True),
     Format(".gltf", FileKind.MESH, _GLTF, says_units=True),
     Format(".obj", FileKind.MESH, ("obj.reader", "read_obj")),
-    Format(".off", FileKind.MESH, _TRIMESH),
+    Format(".off", FileKind.MESH, ("off", "read_off")),
     Format(".ply", FileKind.MESH, ("ply.reader", "read_ply")),
-    Format(".stl", FileKind.MESH, _TRIMESH),
-    Format(".3mf", FileKind.MESH, _TRIMESH, needs=("lxml", "networkx")),
+    Format(".stl", FileKind.MESH, ("stl", "read_stl")),
+    Format(".3mf", FileKind.MESH, ("threemf.reader", "read_3mf"), says_units=True),
     Format(".dae", FileKind.MESH, _TRIMESH, needs=("collada",)),
     Format(".npz", FileKind.MESH, ("mesh_store", "read_stored"), says_units=True),
 )

@@ -65,8 +65,8 @@ def material_of_colors(mesh: Mesh) -> tuple[str, Material] | tuple[None, None]:
     if mesh.colors is None:
         return None, None
     is_opaque = bool((mesh.colors[..., 3] == 1).all())
-    mode = "opaque" if is_opaque else "blend"
-    return "colors", Material(base_color=(1.0, 1.0, 1.0), roughness=0.6, alpha_mode=mode)
+    name, mode = ("colors", "opaque") if is_opaque else ("transparent colors", "blend")
+    return name, Material(base_color=(1.0, 1.0, 1.0), roughness=0.6, alpha_mode=mode)
 
 
 def _within(values: Array, largest: float) -> Array:

@@ -30,17 +30,15 @@ from incpt.formats.gltf.textures import Textures
 from incpt.formats.import_options import current_options
 from incpt.formats.import_report import counted
 from incpt.formats.names import Names
-from incpt.formats.placement import placed_arrays
+from incpt.formats.placement import placed_arrays, transform_of
 from incpt.scene.camera import Camera
 from incpt.scene.mesh import Mesh, MeshSource
 from incpt.scene.mesh_part import MeshFile, MeshPart
 from incpt.scene.model import CAMERA_NAME
-from incpt.scene.transform import IDENTITY, Transform
+from incpt.scene.transform import IDENTITY
 
 MOST_PARTS = 1_000_000
 """Meshes at places that a file may show: a small file can name a great many, each of many parts."""
-_SAME = 1e-9
-"""Matrices that differ by less of their largest number are the same placement."""
 
 
 def read_gltf(path: Path) -> MeshFile:
@@ -197,7 +195,7 @@ class _Parts:
         """The part of a placed primitive; None where no face of it is left."""
         material = placed.primitive.index("material")
         name, made = (None, None) if material is None else self._materials.named(material)
-        transform = _transform_of(placed.matrix)
+        transform = transform_of(placed.matrix)
         if transform is None:
             text = f"the placement of {placed.name!r}: flattens it, so it stands in the vertices"
             import_report.changed(text)
@@ -234,16 +232,3 @@ def _geometry_key(primitive: Table) -> tuple[object, ...]:
     """The same for primitives that differ in nothing but their materials."""
     draco = primitive.extension(DRACO)
     return (primitive.described("attributes", "indices", "mode", "targets"), draco.described("bufferView"))
-
-
-def _transform_of(matrix: npt.NDArray[np.float64]) -> Transform | None:
-    """The placement by a (4, 4) matrix; None where it flattens, or is so large that no object can have it."""
-    if np.array_equal(matrix, np.eye(4)):
-        return IDENTITY
-    try:
-        kept = Transform.from_matrix(matrix)
-        plain = replace(kept, matrix=None)
-    except (InputError, np.linalg.LinAlgError):
-        return None
-    difference = np.abs(plain.world_from_object - kept.world_from_object).max()
-    return plain if difference <= _SAME * np.abs(matrix).max() else kept
