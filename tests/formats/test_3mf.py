@@ -135,6 +135,9 @@ def test_an_object_of_one_material_has_it(tmp_path: Path) -> None:
     assert glass is not None and steel is not None and parts[0].mesh.colors is None
     assert glass.base_color == (0, 0, 1) and glass.alpha == 128 / 255 and glass.alpha_mode == "blend"
     np.testing.assert_allclose(steel.base_color, [0.21586] * 3, atol=1e-4)
+    # A scene knows materials by their names.
+    twins = parts_of(written(tmp_path, model(BASES.replace("steel", "glass") + objects, build)))
+    assert [part.material_name for part in twins.values()] == ["glass", "glass.2", None]
 
 
 def test_images(tmp_path: Path) -> None:

@@ -34,7 +34,6 @@ MOST_OBJECTS = 100_000
 MOST_MODELS = 1000
 MOST_IMAGES = 256
 """Of an object."""
-_DEEPEST = 64
 _GREY = (0.8, 0.8, 0.8, 1.0)
 """Of triangles without a colour beside others that have one, linear."""
 _SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -98,12 +97,12 @@ class _Parts:
 
     def _built(self) -> Iterator[Placed]:
         """Every mesh that is built, with components taken apart. Raises InputError."""
-        left = [(one, 0) for one in reversed(self._model.build)]
+        left = [*reversed(self._model.build)]
         shown = 0
         while left:
-            one, depth = left.pop()
+            one = left.pop()
             shown += 1
-            if shown > MOST_OBJECTS or depth > _DEEPEST:
+            if shown > MOST_OBJECTS:
                 raise InputError(f"builds more than {MOST_OBJECTS:,} objects, or one of itself; split it")
             solid = self._model.solids.get(one.key)
             if solid is None:
@@ -112,8 +111,7 @@ class _Parts:
             if solid.triangles:
                 yield one
             with np.errstate(all="ignore"):
-                below = [Placed(c.key, one.matrix @ c.matrix) for c in reversed(solid.components)]
-            left += [(component, depth + 1) for component in below]
+                left += [Placed(c.key, one.matrix @ c.matrix) for c in reversed(solid.components)]
 
     def _part(self, placed: Placed, upright: npt.NDArray[np.float64]) -> list[MeshPart]:
         solid = self._model.solids[placed.key]
