@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from incpt.formats.bitmaps import load_bitmap as load_bitmap
     from incpt.formats.images import load_image as load_image, write_exr as write_exr, write_png as write_png
     from incpt.formats.mesh_files import load_mesh as load_mesh
+    from incpt.formats.pack import pack as pack
     from incpt.formats.registry import load as load
     from incpt.formats.scene_save import save as save
     from incpt.picture.tone_mapping import tone_map as tone_map
@@ -78,6 +79,7 @@ _HOMES = {
     "load_bitmap": "formats.bitmaps",
     "load_image": "formats.images",
     "load_mesh": "formats.mesh_files",
+    "pack": "formats.pack",
     "save": "formats.scene_save",
     "shape": "scene.shapes",
     "tone_map": "picture.tone_mapping",

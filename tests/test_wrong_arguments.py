@@ -84,6 +84,7 @@ RIGHT: Mapping[str, Mapping[str, Any]] = {
     "load": {"path": CORNELL},
     "load_image": {"path": "a.exr"},
     "load_mesh": {"path": "a.obj"},
+    "pack": {"scene": SCENE, "path": "a"},
     "save": {"scene": SCENE, "path": "a.toml"},
     "shape": {"name": "cube"},
     "tone_map": {"linear": np.ones((2, 2, 3))},

@@ -58,6 +58,20 @@ def import_options(up: str | None, unit: str | None, **others: Any) -> dict[str,
         raise InputError(f"--{error}") from None
 
 
+def read_for_writing(file: Path, up: str | None, unit: str | None, strict: bool, **others: Any) -> Scene:
+    """The scene of a file, to be written elsewhere; what was left out of it is told on stderr. Raises
+    InputError."""
+    from incpt.cli.console import complain
+    from incpt.formats import registry
+
+    scene, report = registry.load_with_report(file, **import_options(up, unit, **others))
+    if strict:
+        report.check_whole()
+    for complaint in registry.complaints(file, scene, report):
+        complain(f"warning: {complaint}", 0)
+    return scene
+
+
 def settings_from(scene: Scene, size: str | None, **given: Any) -> RenderSettings:
     """The scene's settings with those of the command line in their place, where there are any."""
     changes = {name: value for name, value in given.items() if value is not None}

@@ -42,7 +42,12 @@ def save(scene: Scene, path: str | os.PathLike[str]) -> None:
     path = path_of("path", path)
     if path.suffix.lower() != ".toml":
         raise InputError(f"{path}: a scene is saved as TOML; end its name with .toml")
-    beside = _Beside(path)
+    write_scene(scene, path, Beside(path))
+
+
+def write_scene(scene: Scene, path: Path, beside: Beside) -> None:
+    """Writes a scene file, whose meshes and images `beside` finds or writes. Raises OutputError, InputError;
+    then nothing is left behind."""
     try:
         document = _document(scene, beside)
         files.write_bytes(path, document.encode())
@@ -54,41 +59,47 @@ def save(scene: Scene, path: str | os.PathLike[str]) -> None:
         raise
 
 
-class _Beside:
+class Beside:
     """Files that a scene file refers to: found, or written beside it."""
 
     def __init__(self, path: Path) -> None:
-        self._folder = path.parent
+        """`path`: of the scene file."""
+        self.folder = path.parent
         self._stem = path.stem
-        self._written: list[Path] = []
+        self.written: list[Path] = []
         self._names: dict[int, dict[str, str]] = {}
         self._bitmaps: dict[int, dict[str, Any]] = {}
         self._read: dict[str, MeshFile] = {}
 
     def undo(self) -> None:
         """Removes what was written."""
-        for path in self._written:
+        for path in self.written:
             path.unlink(missing_ok=True)
 
     def mesh(self, mesh: Mesh, name: str) -> dict[str, str]:
         """The keys of an object that name its mesh."""
         if id(mesh) not in self._names:
-            self._names[id(mesh)] = self._mesh(mesh, name)
+            self._names[id(mesh)] = self._built_in(mesh) or self._mesh(mesh, name)
         return self._names[id(mesh)]
+
+    def _built_in(self, mesh: Mesh) -> dict[str, str]:
+        """The key of a mesh that is a built-in shape; none of another."""
+        name = mesh.source.shape
+        return {"shape": name} if name is not None and _same_mesh(mesh, shape(name)) else {}
 
     def _mesh(self, mesh: Mesh, name: str) -> dict[str, str]:
         source = mesh.source
-        if source.shape is not None and _same_mesh(mesh, shape(source.shape)):
-            return {"shape": source.shape}
         if source.file is not None and _same_mesh(mesh, self._mesh_on_disk(source)):
             choice = {"part": source.part, "geometry": source.geometry}
             chosen = {key: name for key, name in choice.items() if name is not None}
             return {"mesh": self._relative(source.file), **chosen}
-        label = re.sub(r"[^A-Za-z0-9]+", "-", name)[:40].strip("-") or "mesh"
-        path = self._folder / f"{self._stem}.{label}.{mesh_store.digest(mesh)}{mesh_store.STORED_SUFFIX}"
+        path = (
+            self.folder
+            / f"{self._stem}.{file_label(name, 'mesh')}.{mesh_store.digest(mesh)}{mesh_store.STORED_SUFFIX}"
+        )
         if not path.exists():
             mesh_store.store_mesh(path, mesh)
-            self._written.append(path)
+            self.written.append(path)
         return {"mesh": path.name}
 
     def _mesh_on_disk(self, source: MeshSource) -> Mesh | None:
@@ -106,17 +117,12 @@ class _Beside:
 
     def image(self, image: Image) -> str:
         """The name of an image's file."""
-        if image.source is not None:
-            try:
-                stored = images.load_image(image.source)
-            except InputError:
-                stored = None
-            if stored is not None and np.array_equal(stored.pixels, image.pixels):
-                return self._relative(image.source)
-        path = self._folder / f"{self._stem}.environment.{images.digest(image.pixels)}.exr"
+        if image.source is not None and is_stored_image(image):
+            return self._relative(image.source)
+        path = self.folder / f"{self._stem}.environment.{images.digest(image.pixels)}.exr"
         if not path.exists():
             images.write_exr(path, {"RGB": image.pixels})
-            self._written.append(path)
+            self.written.append(path)
         return path.name
 
     def bitmap(self, bitmap: Bitmap) -> dict[str, Any]:
@@ -127,28 +133,46 @@ class _Beside:
 
     def _bitmap(self, bitmap: Bitmap) -> dict[str, Any]:
         source = bitmap.source
-        if source.file is not None:
-            try:
-                stored = bitmaps.load_bitmap(source.file, source.index)
-            except InputError:
-                stored = None
-            if stored is bitmap or (stored is not None and np.array_equal(stored.pixels, bitmap.pixels)):
-                number = {} if source.index is None else {"image": source.index}
-                return {"file": self._relative(source.file), **number}
+        if source.file is not None and is_stored_bitmap(bitmap):
+            number = {} if source.index is None else {"image": source.index}
+            return {"file": self._relative(source.file), **number}
         digest, suffix = bitmaps.digest(bitmap), bitmaps.suffix_of(bitmap)
-        path = self._folder / f"{self._stem}.texture.{digest}{suffix}"
+        path = self.folder / f"{self._stem}.texture.{digest}{suffix}"
         if not path.exists():
             bitmaps.write_bitmap(path, bitmap)
-            self._written.append(path)
+            self.written.append(path)
         return {"file": path.name}
 
     def _relative(self, file: str) -> str:
         # `..` leaves the folder that a link points to, so links are resolved first.
         absolute = os.path.join(os.path.realpath(os.path.dirname(file)), os.path.basename(file))
         try:
-            return os.path.relpath(absolute, os.path.realpath(self._folder)).replace(os.sep, "/")
+            return os.path.relpath(absolute, os.path.realpath(self.folder)).replace(os.sep, "/")
         except ValueError:  # No relative path leads to another drive.
             return os.path.abspath(file)
+
+
+def file_label(name: str, default: str) -> str:
+    """What a file is called after a name, which may hold anything."""
+    return re.sub(r"[^A-Za-z0-9]+", "-", name)[:40].strip("-") or default
+
+
+def is_stored_image(image: Image) -> bool:
+    """Whether the file that an environment image came from still holds it."""
+    try:
+        stored = images.load_image(str(image.source))
+    except InputError:
+        return False
+    return np.array_equal(stored.pixels, image.pixels)
+
+
+def is_stored_bitmap(bitmap: Bitmap) -> bool:
+    """Whether the file that a bitmap came from still holds it."""
+    try:
+        stored = bitmaps.load_bitmap(str(bitmap.source.file), bitmap.source.index)
+    except InputError:
+        return False
+    return stored is bitmap or np.array_equal(stored.pixels, bitmap.pixels)
 
 
 def _same_mesh(a: Mesh, b: Mesh | None) -> bool:
@@ -158,7 +182,7 @@ def _same_mesh(a: Mesh, b: Mesh | None) -> bool:
     return first.keys() == second.keys() and all(np.array_equal(first[name], second[name]) for name in first)
 
 
-def _document(scene: Scene, beside: _Beside) -> str:
+def _document(scene: Scene, beside: Beside) -> str:
     """The text of a scene file. Raises InputError for a scene that TOML cannot hold."""
     # Imported here, because most programs that import incpt never save a scene.
     import tomlkit
@@ -205,7 +229,7 @@ def _camera_table(camera: Camera) -> dict[str, Any]:
     return {**plain, **_changed(camera)}
 
 
-def _environment_table(environment: Environment, beside: _Beside) -> dict[str, Any]:
+def _environment_table(environment: Environment, beside: Beside) -> dict[str, Any]:
     table: dict[str, Any] = {"color": _toml(environment.color)}
     if environment.image is not None:
         table["image"] = beside.image(environment.image)
@@ -217,7 +241,7 @@ def _environment_table(environment: Environment, beside: _Beside) -> dict[str, A
     return table
 
 
-def _object_table(obj: Object, beside: _Beside) -> dict[str, Any]:
+def _object_table(obj: Object, beside: Beside) -> dict[str, Any]:
     table: dict[str, Any] = {"name": obj.name, **beside.mesh(obj.mesh, obj.name), "material": obj.material}
     table |= _placement(obj.transform)
     if not obj.visible:
@@ -243,12 +267,12 @@ def _placement(transform: Transform) -> dict[str, Any]:
     return {name: _toml(getattr(transform, name)) for name in names}
 
 
-def _material_table(material: Material, beside: _Beside) -> dict[str, Any]:
+def _material_table(material: Material, beside: Beside) -> dict[str, Any]:
     color = _toml(material.base_color)
     return {"base_color": color, **_changed(material), **_textures(material, beside)}
 
 
-def _textures(material: Material, beside: _Beside) -> dict[str, Any]:
+def _textures(material: Material, beside: Beside) -> dict[str, Any]:
     found = {texture_name(slot): texture_of(material, slot) for slot in TextureSlot}
     return {
         name: _toml(texture_value(texture, beside.bitmap))
