@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from incpt.core.settings import RenderSettings as RenderSettings
     from incpt.device.device import Device as Device
     from incpt.formats.bitmaps import load_bitmap as load_bitmap
+    from incpt.formats.gltf_writer.export import export as export
     from incpt.formats.images import load_image as load_image, write_exr as write_exr, write_png as write_png
     from incpt.formats.mesh_files import load_mesh as load_mesh
     from incpt.formats.pack import pack as pack
@@ -75,6 +76,7 @@ _HOMES = {
     "Texture": "scene.texture",
     "Transform": "scene.transform",
     "diff": "scene.change",
+    "export": "formats.gltf_writer.export",
     "load": "formats.registry",
     "load_bitmap": "formats.bitmaps",
     "load_image": "formats.images",

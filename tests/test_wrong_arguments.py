@@ -81,6 +81,7 @@ RIGHT: Mapping[str, Mapping[str, Any]] = {
     "Transform.from_matrix": {"matrix": np.eye(4)},
     "Transform.moved_to": {"matrix": np.eye(4)},
     "diff": {"old": SCENE, "new": SCENE},
+    "export": {"scene": SCENE, "path": "a.glb"},
     "load": {"path": CORNELL},
     "load_image": {"path": "a.exr"},
     "load_mesh": {"path": "a.obj"},

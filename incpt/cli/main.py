@@ -1,4 +1,5 @@
-"""The command line: `incpt render`, `replay`, `devices`, `check`, `pack`, the doors to editor and benchmarks.
+"""The command line: `incpt render`, `replay`, `devices`, `check`, `pack`, `export`, and the doors to the
+editor and the benchmarks.
 
 What a command prints goes to stdout; progress, warnings and errors go to stderr, each error in one line
 that names the fix. Exit status 2 for bad input and usage, 1 for a failure of device, disk or program, 130
@@ -15,7 +16,7 @@ from typing import Annotated, Any
 
 import typer
 
-from incpt.cli import check, devices, doors, pack, render, replay
+from incpt.cli import check, devices, doors, export, pack, render, replay
 from incpt.cli.console import INTERRUPTED, Stopped, complain
 from incpt.core.errors import DeviceError, InputError, InputWarning, OutputError, one_line
 
@@ -35,6 +36,7 @@ app.command("replay")(replay.replay)
 app.command("devices")(devices.devices)
 app.command("check")(check.check)
 app.command("pack")(pack.pack)
+app.command("export")(export.export)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -11,7 +11,7 @@ from incpt.core.arrays import handed_over
 from incpt.core.errors import InputError
 from incpt.formats import import_report
 from incpt.formats.vertex_attributes import NO_ATTRIBUTES, VertexAttributes
-from incpt.formats.welding import mixed, position_hashes
+from incpt.formats.welding import mixed, row_hashes
 from incpt.scene.checks import LARGEST
 from incpt.scene.mesh import Mesh
 
@@ -135,7 +135,7 @@ def _repeated(
 
 def _hashes(vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.int64]) -> npt.NDArray[np.uint64]:
     """(F,) the same for faces with the same positions in the same order, wherever it begins."""
-    of_vertices = position_hashes(vertices)
+    of_vertices = row_hashes(vertices)
     found = np.empty(len(faces), np.uint64)
     for first in range(0, len(faces), _PIECE):
         corners = of_vertices[faces[first : first + _PIECE]]

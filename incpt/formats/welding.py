@@ -17,19 +17,21 @@ def mixed(values: Hashes) -> Hashes:
     return result
 
 
-def position_hashes(vertices: Floats) -> Hashes:
-    """(V,) the same for equal positions (V, 3)."""
-    # Adding zero makes one of the two zeros.
-    with np.errstate(invalid="ignore"):
-        bits = (vertices + np.float32(0)).view(np.uint32).astype(np.uint64)
-    return mixed(mixed(mixed(bits[:, 0]) + bits[:, 1]) + bits[:, 2])
+def row_hashes(rows: Floats) -> Hashes:
+    """(N,) the same for equal rows (N, width)."""
+    hashes = np.zeros(len(rows), np.uint64)
+    for column in rows.T:
+        # Adding zero makes one of the two zeros.
+        with np.errstate(invalid="ignore"):
+            hashes = mixed(hashes + (column + np.float32(0)).view(np.uint32))
+    return hashes
 
 
 def welded(corners: Floats) -> tuple[Floats, npt.NDArray[np.int64]]:
-    """Vertices (V, 3), each of which stands for all corners (C, 3) at its place, in the order in which these
-    come first; and the number (C,) of each corner's vertex. Where two places have one hash, which is not to
-    be expected of fewer than a thousand million, some that are equal stay apart."""
-    hashes = position_hashes(corners)
+    """Vertices (V, width), each of which stands for all corners (C, width) that are equal to it, in the order
+    in which these come first; and the number (C,) of each corner's vertex. Where two have one hash, which is
+    not to be expected of fewer than a thousand million, some that are equal stay apart."""
+    hashes = row_hashes(corners)
     order = np.argsort(hashes, kind="stable")
     ordered, hashes = corners[order], hashes[order]
     begins = np.ones(len(corners), bool)

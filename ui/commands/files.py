@@ -11,6 +11,8 @@ from typing import Any
 from incpt.core.layout import TextureSlot
 from incpt.formats import bitmaps, insert, registry
 from incpt.formats.bitmaps import load_bitmap
+from incpt.formats.gltf_writer.export import export
+from incpt.formats.pack import pack
 from incpt.formats.registry import FileKind
 from incpt.scene.material import texture_name
 from incpt.scene.selection import Selection
@@ -29,6 +31,10 @@ MESH_FILES = FileFilter("Meshes", registry.suffixes(FileKind.MESH))
 """Files that hold a mesh."""
 ENVIRONMENTS = FileFilter("Environments", registry.suffixes(FileKind.IMAGE))
 """Images that may surround the scene."""
+GLTF_FILES = FileFilter("glTF", (".glb",))
+"""What scenes are exported as."""
+ARCHIVES = FileFilter("Archives", (".zip",))
+"""What scenes are packed into."""
 TEXTURES = FileFilter("Images", bitmaps.SUFFIXES)
 """Images that may lie on surfaces."""
 
@@ -80,6 +86,29 @@ def save_to(editor: Editor, path: Path) -> None:
 def import_mesh(editor: Editor) -> None:
     """Ask for a mesh file and add it to the scene."""
     ask_path(editor, "Import mesh", MESH_FILES, False, lambda path: drop(editor, path))
+
+
+def export_gltf(editor: Editor) -> None:
+    """Ask for a place and write the scene there as glTF; say what that cannot hold."""
+
+    def write(path: Path) -> None:
+        with collected_warnings() as warnings:
+            export(editor.scene, path)
+        for warning in warnings:
+            editor.say(warning, "warning")
+        editor.say(f"{path} is written", "done")
+
+    ask_path(editor, "Export glTF", GLTF_FILES, True, write, f"{stem(editor)}.glb")
+
+
+def pack_archive(editor: Editor) -> None:
+    """Ask for a place and write an archive there, with all that the scene needs."""
+
+    def write(path: Path) -> None:
+        pack(editor.scene, path)
+        editor.say(f"{path} is written", "done")
+
+    ask_path(editor, "Pack", ARCHIVES, True, write, f"{stem(editor)}.zip")
 
 
 def choose_environment(editor: Editor) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -378,6 +379,20 @@ def test_a_dropped_mesh_is_added_and_selected(user: Desk, tmp_path: Path) -> Non
     user.run("Import mesh…")
     answer(user, "tri.obj")
     assert user.editor.selection.names == ("tri",)
+
+
+def test_a_scene_is_handed_to_others(user: Desk, tmp_path: Path) -> None:
+    user.run("Export glTF…")
+    answer(user, "other")
+    assert any(text.endswith("other.glb is written") for text in user.texts())
+    assert len(user.texts()) > 1, "what glTF cannot hold is said"
+    names = {obj.name for obj in registry.load(tmp_path / "other.glb").objects}
+    assert {f"other/{obj.name}" for obj in user.scene.objects} <= names
+    user.run("Pack…")
+    answer(user, "all")
+    assert any(text.endswith("all.zip is written") for text in user.texts())
+    with zipfile.ZipFile(tmp_path / "all.zip") as archive:
+        assert "all/scene.toml" in archive.namelist()
 
 
 def test_a_dropped_image_lights_the_scene(user: Desk, tmp_path: Path) -> None:
