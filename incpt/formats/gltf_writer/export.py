@@ -251,7 +251,7 @@ def _quaternion(turn: Array) -> list[float]:
     ]
     quaternion = np.array(rows[first])
     quaternion /= np.linalg.norm(quaternion)
-    return [float(one) + 0.0 for one in quaternion * (-1 if quaternion[3] < 0 else 1)]
+    return [float(one) + 0.0 for one in quaternion]
 
 
 def _farthest(scene: Scene, camera: Camera) -> float:
