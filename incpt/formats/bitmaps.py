@@ -88,7 +88,8 @@ def read_pixels(path: Path) -> npt.NDArray[Any]:
         raise InputError("may hold several images; name one by its number: `image = 0`")
     if path.suffix.lower() == basis.SUFFIX:
         return basis.pixels_of_ktx2(path.read_bytes())
-    file = oiio.ImageInput.open(str(path), config)
+    with muted():
+        file = oiio.ImageInput.open(str(path), config)
     if file is None:
         raise InputError(
             f"is no image that can be read ({_reason(oiio.geterror())}); save it as PNG or OpenEXR"

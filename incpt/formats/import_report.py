@@ -131,8 +131,7 @@ def changed(text: str) -> None:
 
 
 def _tell_of(fate: Fate, text: str) -> None:
-    # Files may hold halves of characters, which no terminal can be given.
-    tell(Remark(fate, _file.get(), one_line(text).encode("utf-8", "replace").decode()))
+    tell(Remark(fate, _file.get(), one_line(text)))
 
 
 def tell(*remarks: Remark) -> None:

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-_NEWLINE, _SPACE = b"\n "
+_NEWLINE = 10
+_IS_BLANK = np.isin(np.arange(256), np.frombuffer(b" \t\n\v\f\r", np.uint8))
+"""(256,) the bytes between words, which are those of `bytes.split` and of numpy: no other control character."""
 
 
 def numbers_at_once(text: bytes, dtype: type = np.float64) -> npt.NDArray[Any]:
@@ -40,7 +42,7 @@ def number_or_nan(word: bytes) -> float:
 def words_in_lines(text: bytes, lines: int) -> npt.NDArray[np.int64]:
     """(lines,) how many words each line of a text has, of which there are so many."""
     buffer = np.frombuffer(text + b"\n", np.uint8)
-    is_word = buffer > _SPACE
+    is_word = ~_IS_BLANK[buffer]
     begins = is_word.copy()
     begins[1:] &= ~is_word[:-1]
     before = np.searchsorted(np.flatnonzero(begins), np.flatnonzero(buffer == _NEWLINE))

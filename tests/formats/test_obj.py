@@ -402,6 +402,14 @@ def test_a_damaged_line_is_told_and_the_others_count(tmp_path: Path, line: str) 
     assert part.material is not None and (part.material.metallic, part.material.clearcoat) == (1, 0.5)
 
 
+def test_control_characters_are_no_blanks(tmp_path: Path) -> None:
+    path = written(tmp_path, f"{SQUARE}v 0 0 \0 1\nf 1 2 \1 3\nf 1 2 3\nf 1 3 4\nf 1 2 5\n")
+    assert told(path) == [
+        "3 of 5 faces: 2 with an index out of range, 1 with a vertex that is not finite or too far away",
+        "faces at a corner '\\x01': it is no index",
+    ]
+
+
 def test_names_with_spaces(tmp_path: Path) -> None:
     for number, line in enumerate(("my colours.mtl", "my\\ colours.mtl gone.mtl")):
         (tmp_path / "my colours.mtl").write_text("newmtl bright red\nKd 1 0 0\n")

@@ -94,6 +94,14 @@ def test_damage_is_told(tmp_path: Path) -> None:
     ]
 
 
+def test_control_characters_are_no_blanks(tmp_path: Path) -> None:
+    part_of(tmp_path, off("OFF", SQUARE, ["3 0 1 2", "3 0 \1 2", "\0", "3 0 2 3"]))
+    assert told(tmp_path) == [
+        "1 face: a line ends before its last corner",
+        "2 of 4 faces: 1 with fewer than three corners, 1 with an index out of range",
+    ]
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
