@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 _NEWLINE = 10
 _IS_BLANK = np.isin(np.arange(256), np.frombuffer(b" \t\n\v\f\r", np.uint8))
-"""(256,) the bytes between words, which are those of `bytes.split` and of numpy: no other control character."""
+"""(256,) which bytes stand between words: as for `bytes.split` and numpy, no other control character."""
 
 
 def numbers_at_once(text: bytes, dtype: type = np.float64) -> npt.NDArray[Any]:
