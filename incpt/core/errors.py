@@ -29,8 +29,8 @@ class InputWarning(UserWarning):
 
 
 def one_line(text: object) -> str:
-    """`text` without line breaks and runs of blanks, cut to LONGEST_MESSAGE characters. What files may hold and
-    no terminal should be given becomes a question mark."""
+    """`text` without line breaks and runs of blanks, cut to LONGEST_MESSAGE characters. What is not to be
+    printed becomes a question mark."""
     line = " ".join(str(text).split())
     if not line.isprintable():
         line = "".join(one if one.isprintable() else "?" for one in line)

@@ -12,7 +12,10 @@ from incpt.formats.import_options import current_options
 
 def check_inside(folder: Path, path: str) -> None:
     """Raises InputError where `path`, relative to a folder or absolute, leads out of it and the options do
-    not let it: a file from a stranger could else show what is on the disk."""
+    not let it: a file from a stranger could else show what is on the disk. Also where no file can be
+    called so."""
+    if "\0" in path:
+        raise InputError(f"{described(path)} is no name of a file")
     root = os.path.realpath(folder)
     found = os.path.realpath(os.path.join(root, path))
     if not current_options().allow_outside and not Path(found).is_relative_to(root):

@@ -208,6 +208,8 @@ def test_images_that_comments_name(tmp_path: Path) -> None:
     assert lost.startswith("image gone.png: ") and lost.endswith("no such file; check the path")
     outside = written(tmp_path, content.replace(b"gone.png", b"../gone.png"), "b.ply")
     assert "leads out of the folder" in told(outside)[0]
+    odd = written(tmp_path, content.replace(b"gone.png", b"go\0ne.png"), "c.ply")
+    assert told(odd) == ["image go?ne.png: 'go\\x00ne.png' is no name of a file"]
 
 
 def test_ends_of_lines(tmp_path: Path) -> None:

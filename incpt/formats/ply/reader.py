@@ -58,14 +58,15 @@ def read_ply(path: Path) -> MeshFile:
         faces = _Faces(elements, vertices)
     _tell_of_unused(elements, vertices, faces)
     counts = {"in all": faces.triangles.too_small, "with fewer than three corners": faces.triangles.too_small}
-    parts = list(_parts(path, header, vertices, faces, counts))
+    images = _Images(path, header, has_uvs=vertices.uvs is not None or faces.uvs is not None)
+    parts = list(_parts(images, vertices, faces, counts))
     tell_of_faces(counts)
     import_report.read(f"{counted(counts['in all'], 'triangle')}, {counted(vertices.count, 'point')}")
     source = MeshSource(file=os.path.abspath(path))
     if len(parts) == 1:
         parts = [replace(parts[0], name=None)]
     named = (replace(one, mesh=replace(one.mesh, source=replace(source, part=one.name))) for one in parts)
-    return MeshFile(tuple(named), files=tuple(path.parent / name for name in header.textures))
+    return MeshFile(tuple(named), files=tuple(images.files))
 
 
 def _elements(header: Header, content: bytes) -> dict[str, Rows]:
@@ -259,9 +260,7 @@ def _tell_of_unused(elements: dict[str, Rows], vertices: _Vertices, faces: _Face
             import_report.left_out(f"properties of {rows.name!r} ({listed}): nothing here is like them")
 
 
-def _parts(
-    path: Path, header: Header, vertices: _Vertices, faces: _Faces, counts: dict[str, int]
-) -> Iterator[MeshPart]:
+def _parts(images: _Images, vertices: _Vertices, faces: _Faces, counts: dict[str, int]) -> Iterator[MeshPart]:
     """A part for each image that faces show; one in all where there is one or none."""
     colors, color_at = vertices.colors, None
     if vertices.colors is None:
@@ -269,11 +268,11 @@ def _parts(
     elif faces.colors is not None:
         import_report.left_out("colours of faces: those of vertices are used")
     uvs = vertices.uvs if faces.uvs is None else faces.uvs
-    textures = _textures(path, header, has_uvs=uvs is not None)
-    images = None if len(textures) < 2 or faces.images is None else faces.images.clip(-1, len(textures))
+    last = len(images.textures)
+    numbers = None if last < 2 or faces.images is None else faces.images.clip(-1, last)
     shown = faces.triangles.faces
-    for number in [0] if images is None else np.unique(images).tolist():
-        chosen = slice(None) if images is None else images == number
+    for number in [0] if numbers is None else np.unique(numbers).tolist():
+        chosen = slice(None) if numbers is None else numbers == number
         mesh = usable_mesh(
             vertices.positions, shown[chosen], vertices.normals, counts,
             VertexAttributes(() if uvs is None else (uvs,), colors),
@@ -281,9 +280,8 @@ def _parts(
             color_at=None if color_at is None else color_at[chosen],
         )  # fmt: skip
         if mesh is not None:
-            texture = textures[number] if 0 <= number < len(textures) else None
-            name, material = _material(header, number, texture, mesh)
-            yield MeshPart(f"image {number}", mesh if images is None else _alone(mesh), name, material)
+            material = images.material(number) or material_of_colors(mesh)
+            yield MeshPart(f"image {number}", mesh if numbers is None else _alone(mesh), *material)
 
 
 def _alone(mesh: Mesh) -> Mesh:
@@ -292,28 +290,30 @@ def _alone(mesh: Mesh) -> Mesh:
     return replace(mesh, vertices=mesh.vertices[used], faces=faces.reshape(-1, 3).astype(np.int32))
 
 
-def _material(
-    header: Header, number: int, texture: Texture | None, mesh: Mesh
-) -> tuple[str, Material] | tuple[None, None]:
-    """The name and the material of what shows an image; without one, of a mesh with colours of its own."""
-    if texture is None:
-        return material_of_colors(mesh)
-    return header.textures[number], Material(base_color=(1.0, 1.0, 1.0), base_color_texture=texture)
+class _Images:
+    """The images that comments name. `textures`: None, which is told, for those that cannot be used; `files`:
+    where they are, or would be. Raises InputError where there are too many."""
 
+    def __init__(self, path: Path, header: Header, has_uvs: bool) -> None:
+        if len(header.textures) > _MOST_IMAGES:
+            raise InputError(f"names {len(header.textures):,} images, more than {_MOST_IMAGES}; split it")
+        self._names = header.textures
+        self.textures: list[Texture | None] = []
+        self.files: list[Path] = []
+        for name in header.textures:
+            self.textures.append(None)
+            try:
+                if not has_uvs:
+                    raise InputError("the file has no texture coordinates")
+                check_inside(path.parent, name)
+                self.files.append(path.parent / name)
+                self.textures[-1] = Texture(bitmaps.load_bitmap(path.parent / name))
+            except InputError as error:
+                import_report.left_out(f"image {name}: {error}")
 
-def _textures(path: Path, header: Header, has_uvs: bool) -> list[Texture | None]:
-    """The images that comments name; None, which is told, for those that cannot be used. Raises
-    InputError."""
-    if len(header.textures) > _MOST_IMAGES:
-        raise InputError(f"names {len(header.textures):,} images, more than {_MOST_IMAGES}; split it")
-    found: list[Texture | None] = []
-    for name in header.textures:
-        try:
-            if not has_uvs:
-                raise InputError("the file has no texture coordinates")
-            check_inside(path.parent, name)
-            found.append(Texture(bitmaps.load_bitmap(path.parent / name)))
-        except InputError as error:
-            import_report.left_out(f"image {name}: {error}")
-            found.append(None)
-    return found
+    def material(self, number: int) -> tuple[str, Material] | None:
+        """The name and the material of what shows an image, where it is there."""
+        texture = self.textures[number] if 0 <= number < len(self.textures) else None
+        if texture is None:
+            return None
+        return self._names[number], Material(base_color=(1.0, 1.0, 1.0), base_color_texture=texture)
