@@ -153,5 +153,6 @@ def _linear(colors: Array) -> Array:
     shares = colors / (255 if (colors > 1).any() else 1)
     linear = np.ones((len(shares), 4))
     linear[:, :3] = linear_from_srgb(shares[:, :3])
-    linear[:, 3:] = np.nan_to_num(shares[:, 3:], nan=1.0)
+    if shares.shape[1] == 4:
+        linear[:, 3] = np.nan_to_num(shares[:, 3], nan=1.0)
     return linear

@@ -197,5 +197,5 @@ def _tell_of_normals(solids: list[_Solid]) -> None:
                 turned += int((np.einsum("fi,fi->f", np.cross(b - a, c - a), solid.normals) < 0).sum())
     if turned:
         import_report.changed(
-            f"{counted(turned, 'normal')}: points inwards by the order of the vertices, which counts"
+            f"normals of {counted(turned, 'facet')}: point inwards by the order of the vertices, which counts"
         )

@@ -196,7 +196,7 @@ def test_what_is_not_read_is_told(tmp_path: Path) -> None:
         (model(solid()).replace(CORE, 'xmlns="http://example.org"'), "<model>: is no model of 3MF"),
         (
             model(solid(), given='requiredextensions="m b"'),
-            "requires 'http://example.org/beams', which is not",
+            "requires the extension 'http://example.org/beams', which",
         ),
         (model(solid(), given='unit="yard"'), "unit 'yard' is none of micron"),
         (model(solid()).replace(' x="1"', ""), "<vertex>: lacks 'x'"),

@@ -52,6 +52,7 @@ def test_ways_of_writing(tmp_path: Path, text: str) -> None:
         ("COFF", "255 0 128 51"),
         ("COFF", "1 0 0.50196 0.2"),
         ("OFF", "255 0 128 51"),
+        ("COFF", "255 0 128"),
         ("NCOFF", "255 0 128 51"),
         ("STCNOFF", "0 0 2 255 0 128 51 0.25 0.75"),
     ],
@@ -62,10 +63,11 @@ def test_what_vertices_have(tmp_path: Path, word: str, rest: str) -> None:
         with pytest.raises(InputError, match="does not begin with its counts"):
             part_of(tmp_path, text)
         return
-    part = part_of(tmp_path, text)
+    part, alpha = part_of(tmp_path, text), 1.0 if rest.count(" ") == 2 else 0.2
     assert part.mesh.colors is not None and part.material is not None
-    np.testing.assert_allclose(part.mesh.colors[0, 0], [1, 0, 0.21586, 0.2], atol=1e-4)
-    assert part.material.base_color == (1, 1, 1) and part.material.alpha_mode == "blend"
+    np.testing.assert_allclose(part.mesh.colors[0, 0], [1, 0, 0.21586, alpha], atol=1e-4)
+    assert part.material.base_color == (1, 1, 1)
+    assert part.material.alpha_mode == ("opaque" if alpha == 1 else "blend")
     if "N" in word:
         assert part.mesh.normals is not None and (part.mesh.normals == [0, 0, 1]).all()
         assert (part.mesh.uvs[0] == [0.25, 0.25]).all()

@@ -16,7 +16,7 @@ from incpt.core.errors import InputError
 from incpt.formats import import_report, mesh_files, registry
 from incpt.formats.import_report import Fate
 from incpt.formats.ply.header import Element, Property, read_header
-from incpt.formats.ply.rows import Rows, body_of
+from incpt.formats.ply.rows import BinaryBody, Rows, TextBody, read_rows
 from incpt.scene.mesh import Mesh
 
 Row = Sequence[object]
@@ -220,6 +220,8 @@ def test_ends_of_lines(tmp_path: Path) -> None:
     rows = ("vertex", ("uchar x", *XYZ[1:]), corners), ("face", FACES, [([0, 1, 2],)])
     content = ply("binary_little_endian", *rows)
     head, tail = content.split(b"end_header\n")
+    # Also where the last line of the header alone ends otherwise.
+    assert mesh_of(tmp_path, head + b"end_header\r\n" + tail).vertices[:, 0].tolist() == [10, 1, 0]
     for end in (b"\n", b"\r\n", b"\r"):
         # The first byte of the rows is that of a line's end too.
         mesh = mesh_of(tmp_path, (head + b"end_header\n").replace(b"\n", end) + tail)
@@ -234,6 +236,18 @@ def test_rows_that_are_not_lines_and_numbers_that_are_none(tmp_path: Path) -> No
     )
     assert len(mesh_files.load_mesh(path).faces) == 2
     assert told(path) == ["2 numbers behind the last element: the header names none"]
+    older = content.replace(b"element vertex", b"Created by hand\nelement vertex")
+    assert told(written(tmp_path, older, "older.ply")) == [
+        "line 3: 'Created by hand' is no line of a PLY header"
+    ]
+    longer = written(tmp_path, content.replace(b"3 0 1 2", b"3 0 1 2 9 1 1 1"), "longer.ply")
+    assert mesh_files.load_mesh(longer).faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert told(longer) == ["numbers at the end of 1 row of 'face': the header names none"]
+    last = written(tmp_path, content.replace(b"3 0 2 3", b"3 0 2 3 1 1"), "last.ply")
+    assert told(last) == ["numbers at the end of 1 row of 'face': the header names none"]
+    shorter = content.replace(b"3 0 1 2\n3 0 2 3", b"3 0 1 2 9\n3 0 2")
+    with pytest.raises(InputError, match="it ends within the 2 rows of 'face'"):
+        mesh_of(tmp_path, shorter)
     odd = written(tmp_path, content.replace(b"\n0 1 0\n", b"\n-1.#IND 1 0\n"), "odd.ply")
     assert told(odd) == ["1 of 2 faces: 1 with a vertex that is not finite or too far away"]
 
@@ -289,9 +303,13 @@ def test_rows_are_what_was_written(
         encoding, ("first", ("uchar one",), [(1,)]), ("some", names, rows), ("last", ("int z",), [(5,)])
     )
     header = read_header(content)
-    body = body_of(content, header)
-    place = Rows(header.elements[0], body, 0).end
-    found = Rows(header.elements[1], body, place)
+    (_, found, last), left = read_rows(header, content)
+    assert left == 0
+    if encoding == "ascii" and longest:
+        body = TextBody(content, header.size)
+        # Lists alone may be rows without a number but their counts.
+        if body.take_lines(count + 2):
+            found = Rows(header.elements[1], body, 1)
     for i, (_, counter) in enumerate(kinds):
         column = [row[i] for row in rows]
         if counter is None:
@@ -300,7 +318,7 @@ def test_rows_are_what_was_written(
             sizes, values = found.lists(f"p{i}")
             assert sizes.tolist() == [len(one) for one in column]
             assert values.tolist() == [value for one in column for value in one]
-    assert Rows(header.elements[2], body, found.end).numbers("z").tolist() == [5]
+    assert last.numbers("z").tolist() == [5]
 
 
 def test_counts_are_compared_with_the_bytes_before_memory_is_taken() -> None:
@@ -308,7 +326,7 @@ def test_counts_are_compared_with_the_bytes_before_memory_is_taken() -> None:
     header = read_header(start)
 
     def end(element: Element, content: bytes) -> int:
-        return Rows(element, body_of(start + content, header), 0).end
+        return Rows(element, BinaryBody(start + content, header.size, "<"), 0).end
 
     lists = [Property("b", "f8", "u4")]
     row = struct.pack("<Id", 1, 5.0)

@@ -121,7 +121,7 @@ def test_what_is_not_read_is_told(tmp_path: Path) -> None:
         "the material of the header: says how shiny Magics shows the file"
     ]
     turned = told(written(tmp_path, in_bytes(normal=(0, 0, -1))), Fate.CHANGED)
-    assert turned == ["2 normals: points inwards by the order of the vertices, which counts"]
+    assert turned == ["normals of 2 facets: point inwards by the order of the vertices, which counts"]
 
 
 def test_a_file_that_ends_early(tmp_path: Path) -> None:

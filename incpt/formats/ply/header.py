@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from incpt.core.checks import described
 from incpt.core.errors import InputError
+from incpt.formats import import_report
 
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _KINDS = {
@@ -17,6 +18,8 @@ _KINDS = {
 """Types by the names that files give them, as numpy calls them without their order of bytes."""
 _END = re.compile(rb"[\r\n]end_header[ \t]*(\r\n|\r|\n|$)")
 _MOST_DIGITS = 18
+_KEYWORDS = ("format", "element", "property")
+"""Of lines without which what follows cannot be read."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,7 @@ def read_header(content: bytes) -> Header:
         raise InputError("is no PLY mesh, or a damaged one (it has no header)")
     size = end.end()
     # Where lines end with \r alone, what looks like the second half of a line's end is the first byte behind.
-    if end[1] == b"\r\n" and b"\r\n" not in content[: end.start() + 1]:
+    if end[1] == b"\r\n" and b"\n" not in content[: end.start() + 1]:
         size -= 1
     header = Header(size)
     lines = content[: end.start()].decode("latin-1").replace("\r\n", "\n").replace("\r", "\n").split("\n")
@@ -65,7 +68,9 @@ def read_header(content: bytes) -> Header:
         try:
             _read_line(header, line)
         except InputError as error:
-            raise InputError(f"line {number}: {error}") from None
+            if line.split(None, 1)[0] in _KEYWORDS:
+                raise InputError(f"line {number}: {error}") from None
+            import_report.left_out(f"line {number}: {error}")
     if header.order is None:
         raise InputError("is no PLY mesh, or a damaged one (its header names no format)")
     return header
@@ -93,7 +98,7 @@ def _read_line(header: Header, line: str) -> None:
         case ["property", kind, name]:
             _add(header, Property(name, _kind(kind)))
         case _:
-            raise InputError(f"{described(line.strip())} is no line of a PLY header; the file is damaged")
+            raise InputError(f"{described(line.strip())} is no line of a PLY header")
 
 
 def _kind(name: str) -> str:

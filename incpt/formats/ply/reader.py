@@ -17,7 +17,7 @@ from incpt.formats.clean import tell_of_faces, usable_mesh
 from incpt.formats.import_report import counted
 from incpt.formats.outside import check_inside
 from incpt.formats.ply.header import Header, read_header
-from incpt.formats.ply.rows import Rows, body_of
+from incpt.formats.ply.rows import Rows, read_rows
 from incpt.formats.polygons import Triangles, triangles_of
 from incpt.formats.text_numbers import whole_or_negative
 from incpt.formats.vertex_attributes import VertexAttributes, material_of_colors
@@ -71,20 +71,17 @@ def read_ply(path: Path) -> MeshFile:
 
 def _elements(header: Header, content: bytes) -> dict[str, Rows]:
     """The rows of each element, by its name. Raises InputError."""
-    body, place = body_of(content, header), 0
+    rows, left = read_rows(header, content)
     found: dict[str, Rows] = {}
-    for element in header.elements:
-        rows = Rows(element, body, place)
-        place = rows.end
-        if element.name in found:
-            import_report.left_out(
-                f"{counted(rows.count, 'row')} of {rows.name!r}: that element stands twice"
-            )
+    for one in rows:
+        if one.name in found:
+            text = f"{counted(one.count, 'row')} of {one.name!r}: that element stands twice"
+            import_report.left_out(text)
         else:
-            found[element.name] = rows
-    if place < body.size:
+            found[one.name] = one
+    if left:
         what = "bytes" if header.order else "numbers"
-        import_report.left_out(f"{body.size - place:,} {what} behind the last element: the header names none")
+        import_report.left_out(f"{left:,} {what} behind the last element: the header names none")
     return found
 
 
@@ -125,6 +122,8 @@ class _Faces:
         self.uv_at: Indices | None = None
         self.images: Indices | None = None
         if not any(rows is not None and rows.count for rows in (faces, strips)):
+            if not vertices.count:
+                raise InputError("has no vertices and no faces")
             raise InputError(
                 f"is a cloud of {counted(vertices.count, 'point')} without faces; make a surface of it "
                 "first, as MeshLab and CloudCompare do"

@@ -17,8 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core.errors import InputError
+from incpt.formats import import_report
+from incpt.formats.import_report import counted
 from incpt.formats.ply.header import Element, Header, Property
-from incpt.formats.text_numbers import numbers_or_nan
+from incpt.formats.text_numbers import numbers_or_nan, whole_or_negative, words_in_lines
 
 Values = npt.NDArray[Any]
 Indices = npt.NDArray[np.int64]
@@ -40,6 +42,11 @@ class Body(ABC):
     @abstractmethod
     def at(self, places: Indices, kind: str) -> Values:
         """The values at places."""
+
+    def lines_from(self, first: int, count: int) -> tuple[Indices, Indices] | None:
+        """Where so many lines begin and end, the first of which is at a place; None where rows are not to be
+        read as lines."""
+        return None
 
     @abstractmethod
     def counter(self, kind: str) -> Callable[[int], int]:
@@ -76,8 +83,25 @@ class TextBody(Body):
     """Values as words of a text."""
 
     def __init__(self, content: bytes, first: int) -> None:
-        self._values = numbers_or_nan(content[first:])
+        self._text = content[first:].replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+        self._values = numbers_or_nan(self._text)
+        self._ends: Indices | None = None
         self.size = len(self._values)
+
+    def take_lines(self, count: int) -> bool:
+        """Has rows read as lines from now on, if there are so many lines. Whether it is so."""
+        words = words_in_lines(self._text, self._text.count(b"\n") + 1)
+        words = words[words > 0]
+        if len(words) == count:
+            self._ends = np.cumsum(words)
+        return self._ends is not None
+
+    def lines_from(self, first: int, count: int) -> tuple[Indices, Indices] | None:
+        if self._ends is None:
+            return None
+        number = int(np.searchsorted(self._ends, first, side="right"))
+        ends = self._ends[number : number + count]
+        return np.concatenate([[first], ends[:-1]])[:count], ends
 
     def width(self, kind: str) -> int:
         return 1
@@ -92,13 +116,6 @@ class TextBody(Body):
     def counter(self, kind: str) -> Callable[[int], int]:
         values = self._values
         return lambda place: int(values[place])
-
-
-def body_of(content: bytes, header: Header) -> Body:
-    """What stands behind the header."""
-    if header.order:
-        return BinaryBody(content, header.size, header.order)
-    return TextBody(content, header.size)
 
 
 @dataclass(frozen=True)
@@ -122,7 +139,8 @@ class Rows:
         self.end = first
         """The place behind them."""
         if element.count and element.properties:
-            self.end = self._alike(first) or self._walked(first)
+            lines = body.lines_from(first, element.count)
+            self.end = self._in_lines(*lines) if lines else self._alike(first) or self._walked(first)
 
     def __contains__(self, name: str) -> bool:
         return name in self._properties
@@ -192,6 +210,29 @@ class Rows:
         self._places = {name: _Places(at, step, size) for name, (at, size) in found.items()}
         return first + step * self.count
 
+    def _in_lines(self, starts: Indices, ends: Indices) -> int:
+        """Finds the places from where lines begin and end, which may have more numbers than their rows. The
+        place behind the rows."""
+        place, last = starts, self._body.size - 1
+        for one in self._properties.values():
+            if one.count_kind is None:
+                self._places[one.name] = _Places(place)
+                place = place + 1
+            else:
+                sizes = whole_or_negative(self._body.at(np.minimum(place, last), one.count_kind))
+                self._places[one.name] = _Places(place + 1, sizes=sizes)
+                if (sizes < 0).any() or (sizes > self._body.size).any():
+                    raise self._cut()
+                place = place + 1 + sizes
+        if (place > ends).any():
+            raise self._cut()
+        longer = int((place < ends).sum())
+        if longer:
+            import_report.left_out(
+                f"numbers at the end of {counted(longer, 'row')} of {self.name!r}: the header names none"
+            )
+        return int(ends[-1])
+
     def _walked(self, first: int) -> int:
         """Finds the places row by row. The place behind the rows."""
         steps, tail = self._steps()
@@ -248,3 +289,30 @@ class Rows:
         return InputError(
             f"is no PLY mesh, or a damaged one (it ends within the {self.count:,} rows of {self.name!r})"
         )
+
+
+def read_rows(header: Header, content: bytes) -> tuple[list[Rows], int]:
+    """The rows of each element, and how much is left behind them. Raises InputError.
+
+    In a text rows follow each other as numbers do, wherever lines end. Where that does not come out even, and
+    there is a line for each row, they are read as lines: some programs write more than their headers name.
+    """
+    if header.order:
+        return _rows_of(header, BinaryBody(content, header.size, header.order))
+    body = TextBody(content, header.size)
+    try:
+        found, left = _rows_of(header, body)
+    except InputError:
+        if not body.take_lines(sum(element.count for element in header.elements)):
+            raise
+        return _rows_of(header, body)
+    if left and body.take_lines(sum(element.count for element in header.elements)):
+        return _rows_of(header, body)
+    return found, left
+
+
+def _rows_of(header: Header, body: Body) -> tuple[list[Rows], int]:
+    found: list[Rows] = []
+    for element in header.elements:
+        found.append(Rows(element, body, found[-1].end if found else 0))
+    return found, body.size - (found[-1].end if found else 0)

@@ -148,7 +148,7 @@ class _PartReader:
         for prefix in given.get("requiredextensions", "").split():
             name = self._namespaces.get(prefix, prefix)
             if name not in _KNOWN:
-                raise InputError(f"requires {described(name)}, which is not read; save it without")
+                raise InputError(f"requires the extension {name!r}, which is not read; save it without")
         if self._part == self._model.parts[0]:
             unit = given.get("unit", "millimeter")
             if unit not in UNITS:
