@@ -114,6 +114,11 @@ BASES = (
 )
 
 
+MIXTURE = (
+    '<m:compositematerials id="7" matid="6" matindices="0"><m:composite values="{}"/></m:compositematerials>'
+)
+
+
 def test_colours(tmp_path: Path) -> None:
     looks = ('pid="5" p1="0" p2="1" p3="0"', 'pid="5" p1="1"', 'pid="6" p1="0"', "")
     text = model(COLORS + BASES + solid(1, *looks, given='pid="6" pindex="1"'))
@@ -138,6 +143,29 @@ def test_an_object_of_one_material_has_it(tmp_path: Path) -> None:
     # A scene knows materials by their names.
     twins = parts_of(written(tmp_path, model(BASES.replace("steel", "glass") + objects, build)))
     assert [part.material_name for part in twins.values()] == ["glass", "glass.2", None]
+
+
+def test_mixtures_and_layers(tmp_path: Path) -> None:
+    mixtures = (
+        '<m:compositematerials id="11" matid="6" matindices="1 0 7"><m:composite values="1 3 9"/>'
+        '</m:compositematerials><m:multiproperties id="12" pids="6 5 99"><m:multi pindices="0 1"/>'
+        '<m:multi pindices="0"/><m:multi pindices="0 9"/></m:multiproperties>'
+    )
+    looks = ('pid="11" p1="0"', 'pid="12" p1="0"', 'pid="12" p1="1"', 'pid="12" p1="2"')
+    path = written(tmp_path, model(COLORS + BASES + mixtures + solid(1, *looks)))
+    (part,) = parts_of(path).values()
+    assert part.mesh.colors is not None
+    grey = 0.75 * 0.21586
+    expected = [
+        [grey, grey, grey + 0.25, 0.75 + 0.25 * 128 / 255],
+        [0, 1, 0, 0.2],
+        [1, 0, 0, 1],
+        [0.8] * 3 + [1],
+    ]
+    np.testing.assert_allclose(part.mesh.colors[:, 0], expected, atol=1e-4)
+    assert told(path) == []
+    layers = "layers of properties 12 of /3D/3dmodel.model: only the topmost is used"
+    assert told(path, Fate.CHANGED) == [layers]
 
 
 def test_images(tmp_path: Path) -> None:
@@ -174,11 +202,10 @@ def test_several_model_parts(tmp_path: Path) -> None:
 
 def test_what_is_not_read_is_told(tmp_path: Path) -> None:
     build = '<item objectid="1"/><item objectid="9"/><item objectid="1" transform="1 0 0 0 1 0 0 0 0 0 0 0"/>'
-    group = '<m:multiproperties id="3" pids="1"><m:multi pindices="0"/></m:multiproperties>'
+    group = '<m:multiproperties id="3" pids="1"><m:multi pindices="0"/></m:multiproperties><b:beam/>'
     path = written(tmp_path, model(group + solid(1, 'pid="3" p1="0"', "", "", ""), build))
     assert told(path) == [
-        "1 element <multiproperties> of /3D/3dmodel.model: nothing here is like them",
-        "1 element <multi> of /3D/3dmodel.model: nothing here is like them",
+        "1 element <beam> of /3D/3dmodel.model: nothing here is like them",
         "properties 3 of /3D/3dmodel.model: are no colours, materials or images",
         "object 9 of /3D/3dmodel.model: is not in the file",
         "object 'object 1': its placement flattens it",

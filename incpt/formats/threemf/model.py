@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import posixpath
 from array import array
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -31,9 +33,12 @@ _SILENT = frozenset(f"{CORE} {name}" for name in (
     "resources", "build", "mesh", "vertices", "triangles", "components", "metadata", "metadatagroup",
 ))  # fmt: skip
 """Elements that hold others, or say nothing of what is seen."""
+GREY = (0.8, 0.8, 0.8, 1.0)
+"""Of what has no colour beside others that have one, linear."""
 NOTHING = -1
 """In place of a number that a triangle or an object does not have."""
 
+Row = TypeVar("Row", bound=tuple[float, ...])
 Key = tuple[str, int]
 """A resource: the part that it stands in, and its id there."""
 Matrix = npt.NDArray[np.float64]
@@ -79,6 +84,15 @@ class ImageGroup:
     uvs: list[tuple[float, float]] = field(default_factory=list)
 
 
+@dataclass
+class LayerGroup:
+    """Properties that lie on each other: the ids of their groups, the lowest first, and for each property its
+    numbers in these."""
+
+    groups: list[int]
+    numbers: list[list[int]] = field(default_factory=list)
+
+
 @dataclass(frozen=True)
 class ImageUse:
     """The part that holds an image, and how it goes on beyond its edges."""
@@ -107,6 +121,7 @@ def read_part(model: Model, part: str, pieces: Iterable[bytes]) -> None:
     """Adds what a model part holds; parts that it names are added to `model.parts`. Raises InputError."""
     reader = _PartReader(model, part)
     read_elements(pieces, part, reader.take, reader.declare)
+    reader.flatten_layers()
     for name, count in reader.unknown.items():
         import_report.left_out(f"{counted(count, 'element')} <{name}> of {part}: nothing here is like them")
 
@@ -118,6 +133,9 @@ class _PartReader:
         self._model, self._part = model, part
         self._solid = Solid("", NOTHING, NOTHING)
         self._colors, self._image_group = ColorGroup(), ImageGroup(("", NOTHING))
+        self._mixed, self._mixed_from = ColorGroup(), (ColorGroup(), [0])
+        self._layers = LayerGroup([])
+        self._layer_groups: dict[int, LayerGroup] = {}
         self.unknown: Counter[str] = Counter()
         self._namespaces: dict[str | None, str] = {}
         # Until the root is there, no other element may be.
@@ -162,6 +180,8 @@ class _PartReader:
         materials: dict[str, Handler] = {
             "colorgroup": self._color_group, "color": self._color, "texture2d": self._image,
             "texture2dgroup": self._begin_image_group, "tex2coord": self._uv,
+            "compositematerials": self._begin_mixtures, "composite": self._mixture,
+            "multiproperties": self._begin_layers, "multi": self._layer,
         }  # fmt: skip
         self._handlers = {f"{CORE} {name}": handler for name, handler in core.items()}
         self._handlers |= {f"{MATERIALS} {name}": handler for name, handler in materials.items()}
@@ -229,6 +249,66 @@ class _PartReader:
 
     def _uv(self, given: dict[str, str]) -> None:
         self._image_group.uvs.append((float(given["u"]), float(given["v"])))
+
+    def _begin_mixtures(self, given: dict[str, str]) -> None:
+        base = self._model.colors.get((self._part, int(given["matid"])), ColorGroup())
+        self._mixed = self._model.colors[self._part, int(given["id"])] = ColorGroup()
+        self._mixed_from = base, _whole_numbers(given["matindices"])
+
+    def _mixture(self, given: dict[str, str]) -> None:
+        base, places = self._mixed_from
+        shares = [max(float(word), 0.0) for word in given["values"].split()]
+        parts = [
+            (share, base.colors[place])
+            for share, place in zip(shares, places, strict=False)
+            if 0 <= place < len(base.colors)
+        ]
+        total = sum(share for share, _ in parts)
+        if not 0 < total < math.inf:
+            raise InputError("mixes nothing; give it values, and materials that there are")
+        mixed = np.sum([np.multiply(share / total, color) for share, color in parts], axis=0)
+        self._mixed.colors.append(tuple(mixed.tolist()))
+
+    def _begin_layers(self, given: dict[str, str]) -> None:
+        self._layers = LayerGroup(_whole_numbers(given["pids"]))
+        self._layer_groups[int(given["id"])] = self._layers
+
+    def _layer(self, given: dict[str, str]) -> None:
+        self._layers.numbers.append(_whole_numbers(given["pindices"]))
+
+    def flatten_layers(self) -> None:
+        """Makes groups of their own of those with layers: of each the topmost that is an image or a
+        colour."""
+        for number, layers in self._layer_groups.items():
+            key = self._part, number
+            known = [
+                (place, (self._part, group)) for place, group in enumerate(layers.groups)
+                if (self._part, group) in self._model.colors.keys() | self._model.image_groups.keys()
+            ]  # fmt: skip
+            if not known:
+                continue
+            place, below = known[-1]
+            chosen = [row[place] if place < len(row) else 0 for row in layers.numbers]
+            if below in self._model.colors:
+                colors = self._model.colors[below].colors
+                self._model.colors[key] = ColorGroup([_at(colors, one, GREY) for one in chosen])
+            else:
+                group = self._model.image_groups[below]
+                self._model.image_groups[key] = ImageGroup(
+                    group.image, [_at(group.uvs, one, (0.0, 0.0)) for one in chosen]
+                )
+            if len(layers.groups) > 1:
+                import_report.changed(
+                    f"layers of properties {number} of {self._part}: only the topmost is used"
+                )
+
+
+def _at(values: Sequence[Row], place: int, default: Row) -> Row:
+    return values[place] if 0 <= place < len(values) else default
+
+
+def _whole_numbers(text: str) -> list[int]:
+    return [int(word) for word in text.split()]
 
 
 def _local(name: str) -> str:

@@ -17,7 +17,7 @@ from incpt.formats.import_report import counted
 from incpt.formats.names import Names
 from incpt.formats.orientation import ROTATIONS
 from incpt.formats.placement import transform_of
-from incpt.formats.threemf.model import NOTHING, Key, Model, Placed, Solid, read_part
+from incpt.formats.threemf.model import GREY, NOTHING, Key, Model, Placed, Solid, read_part
 from incpt.formats.threemf.package import Package
 from incpt.formats.vertex_attributes import NO_ATTRIBUTES, VertexAttributes, material_of_colors
 from incpt.scene.material import Material
@@ -34,8 +34,6 @@ MOST_OBJECTS = 100_000
 MOST_MODELS = 1000
 MOST_IMAGES = 256
 """Of an object."""
-_GREY = (0.8, 0.8, 0.8, 1.0)
-"""Of triangles without a colour beside others that have one, linear."""
 _SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
@@ -180,7 +178,7 @@ class _Parts:
         found = {group: one for group, one in colors.items() if one is not None}
         if not found:
             return _Look()
-        values, at = _at_corners(groups, numbers, {g: one.colors for g, one in found.items()}, _GREY)
+        values, at = _at_corners(groups, numbers, {g: one.colors for g, one in found.items()}, GREY)
         if len(found) > 1 or (at != at.flat[0]).any():
             return _Look(VertexAttributes(colors=values), color_at=at)
         group = next(iter(found.values()))
