@@ -19,11 +19,11 @@ from incpt.core.settings import RenderSettings
 from incpt.formats import import_report
 from incpt.formats.gltf.lights import EXTENSION as LIGHTS
 from incpt.formats.gltf_writer.container import Container
+from incpt.formats.gltf_writer.geometry import GeometryWriter
 from incpt.formats.gltf_writer.losses import Losses
 from incpt.formats.gltf_writer.materials import MaterialWriter
 from incpt.formats.names import Names
 from incpt.formats.placement import transform_of
-from incpt.formats.welding import welded
 from incpt.scene.camera import Camera
 from incpt.scene.light import Light
 from incpt.scene.material import Material
@@ -66,7 +66,7 @@ class _Export:
         self._scene, self._prefix = scene, prefix
         self._losses = Losses()
         self._materials = MaterialWriter(self.container, self._losses)
-        self._attributes: dict[Mesh, dict[str, Any]] = {}
+        self._geometry = GeometryWriter(self.container)
         self._meshes: dict[tuple[Mesh, str], int] = {}
         self._labels = Names()
         self._add_everything()
@@ -111,19 +111,17 @@ class _Export:
     def _mesh(self, mesh: Mesh, material: str) -> int:
         key = mesh, material
         if key not in self._meshes:
-            number = self._materials.number(material, self._scene.materials[material])
             source = mesh.source
             label = source.geometry or source.part or source.shape or Path(source.file or "mesh").stem
             self._meshes[key] = self.container.add("meshes", {
                 "name": self._labels.new(label),
-                "primitives": [self._primitive(mesh, number)],
+                "primitives": [self._primitive(mesh, material, self._scene.materials[material])],
             })  # fmt: skip
         return self._meshes[key]
 
-    def _primitive(self, mesh: Mesh, material: int) -> dict[str, Any]:
-        if mesh not in self._attributes:
-            self._attributes[mesh] = _primitive(self.container, mesh)
-        return {**self._attributes[mesh], "material": material}
+    def _primitive(self, mesh: Mesh, name: str, material: Material) -> dict[str, Any]:
+        number = self._materials.number(name, material)
+        return {**self._geometry.primitive(mesh, material), "material": number}
 
     def _camera(self, name: str, camera: Camera) -> int:
         width, height = self._scene.settings.size
@@ -175,38 +173,12 @@ class _Export:
         material = Material(
             base_color=(0.0, 0.0, 0.0), specular=0.0, emission=light.emitted, double_sided=light.double_sided
         )
-        number = self._materials.number(light.name, material)
-        primitive = self._primitive(_surface_of(light.kind), number)
+        primitive = self._primitive(_surface_of(light.kind), light.name, material)
         mesh = self.container.add("meshes", {"name": light.name, "primitives": [primitive]})
         half = light.half_size
         scale = (*half, 1.0) if light.kind != "sphere" else (half[0],) * 3
         place = Transform(light.position, light.rotation, scale)
         return self._node(light.name, place, light.visible, {"mesh": mesh})
-
-
-def _primitive(container: Container, mesh: Mesh) -> dict[str, Any]:
-    """The keys of a primitive that hold a mesh: corners that are alike in all that they have are one
-    vertex."""
-    columns: dict[str, npt.NDArray[np.float32] | None] = {
-        "NORMAL": mesh.normals,
-        **{f"TEXCOORD_{number}": uvs for number, uvs in enumerate(mesh.uvs)},
-        "COLOR_0": mesh.colors,
-        "TANGENT": mesh.tangents if mesh.normals is not None else None,
-    }
-    found = {name: values for name, values in columns.items() if values is not None}
-    if not found:
-        used, faces = np.unique(mesh.faces, return_inverse=True)
-        positions, at = mesh.vertices[used], {}
-        indices = faces.reshape(-1)
-    else:
-        corners = [mesh.vertices[mesh.faces], *found.values()]
-        rows, indices = welded(np.concatenate(corners, axis=2).reshape(3 * len(mesh.faces), -1))
-        widths = np.cumsum([values.shape[2] for values in corners])[:-1]
-        positions, *columns_of = (np.ascontiguousarray(one) for one in np.split(rows, widths, axis=1))
-        at = dict(zip(found, columns_of, strict=True))
-    attributes = {"POSITION": container.values(positions, with_bounds=True)}
-    attributes |= {name: container.values(values) for name, values in at.items()}
-    return {"attributes": attributes, "indices": container.indices(indices)}
 
 
 @cache

@@ -32,6 +32,7 @@ from incpt.scene.material import Material, texture_name
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
+from incpt.scene.tangents import corner_tangents
 from incpt.scene.texture import Bitmap, Texture
 
 DARK = Environment((0.0, 0.0, 0.0))
@@ -232,6 +233,28 @@ def test_every_texture_comes_back(tmp_path: Path) -> None:
     assert kinds_of_images(tmp_path / "again.glb")[0] == "image/jpeg"
     round_trip(scene, tmp_path)
     assert kinds_of_images(tmp_path / "again.glb") == ["image/png"] * 3
+
+
+def test_meshes_have_what_materials_want_of_them(tmp_path: Path) -> None:
+    """Files are not valid else."""
+    texture = Texture(Bitmap(np.zeros((1, 1, 3), np.uint8)), uv_set=1)
+    materials = {
+        "plain": Material(),
+        "image": Material(base_color_texture=texture),
+        "grooves": Material(anisotropy_rotation=0.5),
+    }
+    flat = Mesh(TETRAHEDRON, FACES)
+    objects = tuple(Object(name, flat, name) for name in materials)
+    again, _ = round_trip(Scene(Camera(), DARK, materials, objects), tmp_path)
+    plain, image, grooves = (obj.mesh for obj in again.objects)
+    assert plain.uvs == () and plain.normals is None and grooves.uvs == ()
+    assert len(image.uvs) == 2 and not any(uvs.any() for uvs in image.uvs)
+    np.testing.assert_allclose(grooves.tangents, corner_tangents(flat), atol=1e-6)
+    a, b, c = (TETRAHEDRON[FACES[:, i]] for i in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    assert grooves.normals is not None
+    np.testing.assert_allclose(grooves.normals, np.repeat(normals[:, None], 3, axis=1), atol=1e-6)
 
 
 def test_images_of_floats_become_16_bits(tmp_path: Path) -> None:
