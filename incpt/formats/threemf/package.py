@@ -15,7 +15,7 @@ from incpt.core.checks import described
 from incpt.core.errors import InputError, reason_of
 from incpt.formats.threemf.markup import read_elements
 
-MOST_GROWTH = 200
+MOST_GROWTH = 50
 """How many times its size an archive may have when it is unpacked; meshes as text grow about ten times."""
 _ALLOWANCE = 1 << 20
 _PIECE = 1 << 20

@@ -86,12 +86,14 @@ class _Parts:
         unit = self._model.unit
         turn = Transform(rotation=ROTATIONS["z"], scale=(unit, unit, unit)).world_from_object
         upright = np.vstack([turn, [0, 0, 0, 1]])
-        placed = [self._part(one, upright) for one in self._built()]
-        parts = tuple(part for some in placed for part in some)
+        parts: list[MeshPart] = []
+        for one in self._built():
+            parts += self._part(one, upright)
+            _check_count(len(parts))
         tell_of_faces(self._counts)
         if not parts:
             raise InputError("has no usable face (nothing that it builds can be placed)")
-        return (replace(parts[0], name=None),) if len(parts) == 1 else parts
+        return (replace(parts[0], name=None),) if len(parts) == 1 else tuple(parts)
 
     def _built(self) -> Iterator[Placed]:
         """Every mesh that is built, with components taken apart. Raises InputError."""
@@ -100,8 +102,7 @@ class _Parts:
         while left:
             one = left.pop()
             shown += 1
-            if shown > MOST_OBJECTS:
-                raise InputError(f"builds more than {MOST_OBJECTS:,} objects, or one of itself; split it")
+            _check_count(shown)
             solid = self._model.solids.get(one.key)
             if solid is None:
                 import_report.left_out(f"object {one.key[1]} of {one.key[0]}: is not in the file")
@@ -221,6 +222,11 @@ class _Look:
     color_at: Indices | None = None
     name: str = ""
     material: Material | None = None
+
+
+def _check_count(objects: int) -> None:
+    if objects > MOST_OBJECTS:
+        raise InputError(f"builds more than {MOST_OBJECTS:,} objects, or one of itself; split it")
 
 
 def _at_corners(
