@@ -61,9 +61,10 @@ def _needs_of(material: Material, mesh: Mesh) -> _Needs:
     textures = [texture_of(material, slot) for slot in TextureSlot if slot is not TextureSlot.BUMP]
     sets = max((one.uv_set + 1 for one in textures if one is not None), default=0)
     has_grooves = material.anisotropy or material.anisotropy_rotation or material.anisotropy_texture
-    if not has_grooves or (mesh.tangents is not None and mesh.normals is not None):
+    has_coat = material.clearcoat_normal_texture is not None and material.normal_texture is None
+    if not (has_grooves or has_coat) or (mesh.tangents is not None and mesh.normals is not None):
         return _Needs(max(sets, len(mesh.uvs)), None)
-    # Grooves run along tangents, which glTF takes from the file or, where there is one, from a normal map.
+    # Readers make tangents for a normal map, and for nothing else.
     maps = (material.normal_texture, material.clearcoat_normal_texture, material.anisotropy_texture)
     chosen = next((one.uv_set for one in maps if one is not None), 0)
     return _Needs(max(sets, len(mesh.uvs)), chosen)

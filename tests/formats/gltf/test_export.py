@@ -242,13 +242,15 @@ def test_meshes_have_what_materials_want_of_them(tmp_path: Path) -> None:
         "plain": Material(),
         "image": Material(base_color_texture=texture),
         "grooves": Material(anisotropy_rotation=0.5),
+        "coat": Material(clearcoat_normal_texture=texture),
     }
     flat = Mesh(TETRAHEDRON, FACES)
     objects = tuple(Object(name, flat, name) for name in materials)
     again, _ = round_trip(Scene(Camera(), DARK, materials, objects), tmp_path)
-    plain, image, grooves = (obj.mesh for obj in again.objects)
+    plain, image, grooves, coat = (obj.mesh for obj in again.objects)
     assert plain.uvs == () and plain.normals is None and grooves.uvs == ()
     assert len(image.uvs) == 2 and not any(uvs.any() for uvs in image.uvs)
+    assert len(coat.uvs) == 2 and coat.tangents is not None
     np.testing.assert_allclose(grooves.tangents, corner_tangents(flat), atol=1e-6)
     a, b, c = (TETRAHEDRON[FACES[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)
