@@ -230,7 +230,8 @@ def test_equal_scenes_have_no_partners(in_blocks: bool, device: Device) -> None:
     """Nor do scenes whose difference no path can meet."""
     old = mixed()
     unused = old.with_material("unused", base_color=(1, 0, 0), metallic=1.0)
-    for other in (old, mixed(), unused, old.with_object("red cube", visible=False)):
+    alike = replace(mixed(), environment=old.environment)
+    for other in (old, alike, unused, old.with_object("red cube", visible=False)):
         hidden = other.object("red cube").visible is False
         new = other.with_object("red cube", position=(1, 1, 1)) if hidden else other
         pairs = traced_pairs(device, other if hidden else old, new, in_blocks, spp=2)
