@@ -15,7 +15,7 @@ from incpt.core.settings import RenderSettings
 if TYPE_CHECKING:
     from incpt.scene.model import Scene
 
-SceneArgument = Annotated[Path, typer.Argument(help="Scene file (.toml).", show_default=False)]
+SceneArgument = Annotated[Path, typer.Argument(help="Scene file or mesh.", show_default=False)]
 DeviceOption = Annotated[
     str | None,
     typer.Option(

@@ -26,17 +26,20 @@ class ImportOptions:
     allow_outside   whether files may name others outside their own folders
     up              the axis that is up in mesh files that do not say it, "y" or "z"; None: y
     unit            the metres of their unit; None: one
+    materials       whether mesh files bring their materials; scenes of other renderers have their own
     """
 
     time: float | None = None
     allow_outside: bool = False
     up: str | None = None
     unit: float | None = None
+    materials: bool = True
 
     def __post_init__(self) -> None:
         if not isinstance(self.time, NoneType):
             set_number(self, "time", 0.0, LARGEST)
-        require_bool("allow_outside", self.allow_outside)
+        for name in ("allow_outside", "materials"):
+            require_bool(name, getattr(self, name))
         if self.up is not None:
             one_of("up", self.up, UP_AXES)
         if self.unit is not None:

@@ -21,12 +21,14 @@ from incpt.ui.dialogs.native import FileFilter
 from incpt.ui.dialogs.path_dialog import PathDialog
 from incpt.ui.dialogs.question import Choice, Question
 from incpt.ui.editor.dialog import Answer
-from incpt.ui.editor.document import Document, collected_warnings
+from incpt.ui.editor.document import SUFFIX, Document, collected_warnings
 from incpt.ui.editor.editor import Editor
 from incpt.ui.editor.recovery import Recovery, find_left_behind
 
 SCENE_FILES = FileFilter("Scenes", registry.suffixes(FileKind.SCENE))
 """Files that hold a whole scene."""
+SAVED_SCENES = FileFilter("Scenes", (SUFFIX,))
+"""Those that a scene is saved to."""
 MESH_FILES = FileFilter("Meshes", registry.suffixes(FileKind.MESH))
 """Files that hold a mesh."""
 ENVIRONMENTS = FileFilter("Environments", registry.suffixes(FileKind.IMAGE))
@@ -73,7 +75,7 @@ def save_as(editor: Editor, then: Callable[[], None] | None = None) -> None:
         if then is not None:
             then()
 
-    ask_path(editor, "Save as", SCENE_FILES, True, write, f"{stem(editor)}.toml")
+    ask_path(editor, "Save as", SAVED_SCENES, True, write, f"{stem(editor)}{SUFFIX}")
 
 
 def save_to(editor: Editor, path: Path) -> None:

@@ -68,8 +68,8 @@ class Document:
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], **options: Any) -> Document:
-        """A document from a scene file, or an untitled one around a mesh file. `options` are those of
-        `registry.load_with_report`. Raises InputError."""
+        """A document from a scene file, or an untitled one of a file that is not saved to: a mesh, or a scene
+        of another renderer. `options` are those of `registry.load_with_report`. Raises InputError."""
         absolute = absolute_path(path)
         scene, report = registry.load_with_report(absolute, **options)
         warnings = tuple(map(one_line, registry.complaints(absolute, scene, report)))

@@ -16,6 +16,7 @@ from incpt.core.errors import InputError
 from incpt.core.files import read_bytes
 from incpt.formats import import_report
 from incpt.formats.clean import tell_of_faces, usable_mesh
+from incpt.formats.import_options import current_options
 from incpt.formats.import_report import counted
 from incpt.formats.names import Names
 from incpt.formats.obj.lines import IMPOSSIBLE, NOWHERE, ObjText, State, decoded, read_text
@@ -44,7 +45,7 @@ def read_obj(path: Path) -> MeshFile:
     part_of_run = np.array([place[_part_of(run.state)] for run in text.runs], np.int64)
     meshes = _Meshes(text, triangles, normals, counts).of(part_of_run[triangles.run], len(keys))
     tell_of_faces(counts)
-    library = _materials(path, text)
+    library = _materials(path, text) if current_options().materials else MaterialLibrary()
     _tell_of_rest(text)
     found = [(name, key[1], mesh) for name, key, mesh in zip(_names(keys), keys, meshes, strict=True) if mesh]
     used = {material for _, material, _ in found} & library.materials.keys()

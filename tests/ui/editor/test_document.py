@@ -97,6 +97,16 @@ def test_a_mesh_file_opens_as_an_untitled_scene_and_tells_what_it_lost(tmp_path:
     assert document.warnings == (str(remark),) and remark.file == str(path)
 
 
+def test_a_scene_of_another_renderer_is_saved_as_one_of_ours(tmp_path: Path) -> None:
+    path = tmp_path / "room.xml"
+    path.write_text('<scene version="3.0.0"><shape type="cube"/><emitter type="constant"/></scene>')
+    document = Document.open(path)
+    assert (document.path, document.name, document.warnings) == (None, "room", ())
+    written = document.save(tmp_path / "room")
+    assert written.name == "room.toml"
+    assert Document.open(written).scene.objects[0].transform == document.scene.objects[0].transform
+
+
 def test_what_cannot_be_opened_says_why(tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text("version = 9\n")
     for name in ("missing.toml", "bad.toml", "x.docx", "\0.toml"):
