@@ -103,35 +103,53 @@ def upright(texture: Texture) -> Texture:
     return replace(texture, bitmap=Bitmap(pixels))
 
 
-def blended_matte(first: Look, second: Look, weight: Amount) -> Look:
-    """What is between two Lambertian surfaces, which is one again."""
-    ends: tuple[Vector, Vector] = first["base_color"], second["base_color"]
-    if weight.image is None:
-        return {**MATTE, "base_color": between(*ends, min(weight.value, 1.0))}
-    share = np.clip(weight.image.pixels, 0, 1)[..., None]
-    texture = weight.image.with_pixels((1 - share) * ends[0] + share * ends[1])
-    return {**MATTE, "base_color": (1.0, 1.0, 1.0), "base_color_texture": texture}
-
-
-def blended_numbers(first: Look, second: Look, weight: float) -> Look | None:
-    """The values of two materials, mixed; None where something else than numbers differs, or metal, whose
-    colour means something else."""
-    whole, other = (
+def blended(first: Look, second: Look, weight: Amount) -> Look | None:
+    """What is between two opaque materials, number by number, exactly of two Lambertian ones. None where
+    something else than numbers differs, or an image."""
+    own, other = (
         {name: getattr(Material(**look), name) for name in {*first, *second}} for look in (first, second)
     )
-    mixed: Look = {}
-    for name, value in whole.items():
-        if value == other[name]:
-            mixed[name] = value
-        elif name in ("metallic", "transmission", "priority") or isinstance(value, bool):
-            return None
-        elif isinstance(value, float):
-            mixed[name] = (1 - weight) * value + weight * other[name]
-        elif isinstance(value, tuple):
-            mixed[name] = between(value, other[name], weight)
-        else:
-            return None
-    return mixed
+    unlike = [name for name, value in own.items() if value != other[name]]
+    plain = all(
+        isinstance(own[name], float | tuple) and isinstance(other[name], float | tuple) for name in unlike
+    )
+    images = any(isinstance(value, Texture) for value in (*own.values(), *other.values()))
+    if not plain or (images and unlike) or max(own.get("transmission", 0), other.get("transmission", 0)) > 0:
+        return None
+    if "ior" in unlike and 1 in (own.get("metallic"), other.get("metallic")):
+        # That of metal says nothing.
+        own["ior"] = other["ior"] = (other if own.get("metallic") == 1 else own)["ior"]
+    mixed = {name: _mixed(value, other[name], min(weight.mean, 1.0)) for name, value in own.items()}
+    return mixed if weight.image is None else {**mixed, **_woven(own, other, weight.image)}
+
+
+def _mixed(first: Any, second: Any, share: float) -> Any:
+    if first == second:
+        return first
+    return between(first, second, share) if isinstance(first, tuple) else (1 - share) * first + share * second
+
+
+def _woven(first: Look, second: Look, weight: NumberImage) -> Look:
+    """The values of two materials that images may say, by a weight at each place."""
+    share = np.clip(weight.pixels, 0, 1)
+    look: Look = {}
+    if first["base_color"] != second["base_color"]:
+        colors = (1 - share[..., None]) * first["base_color"] + share[..., None] * second["base_color"]
+        look |= {"base_color": (1.0, 1.0, 1.0), "base_color_texture": weight.with_pixels(colors)}
+    default = Material()
+    rough, metal, specular = (
+        (1 - share) * first.get(name, getattr(default, name))
+        + share * second.get(name, getattr(default, name))
+        for name in ("roughness", "metallic", "specular")
+    )
+    if np.ptp(rough) > 0 or np.ptp(metal) > 0:
+        look |= {"roughness": 1.0, "metallic": 1.0}
+        look["metallic_roughness_texture"] = _packed(weight, rough, metal)
+    if np.ptp(specular) > 0:
+        # Its share stands in alpha.
+        pixels = np.concatenate([np.ones((*share.shape, 3)), specular[..., None]], axis=2)
+        look |= {"specular": 1.0, "specular_texture": weight.with_pixels(pixels)}
+    return look
 
 
 def between(first: Vector, second: Vector, share: float) -> Vector:

@@ -22,8 +22,7 @@ from incpt.formats.mitsuba.looks import (
     MATTE,
     Look,
     between,
-    blended_matte,
-    blended_numbers,
+    blended,
     hue,
     metal_and_roughness,
     product,
@@ -312,15 +311,14 @@ class Materials:
         if len(found) != 2:
             raise InputError(f"a blendbsdf blends two BSDFs, not {len(found)}")
         weight = self.textures.amount(node, "weight", 0.5)
-        if all(set(one.look) == set(MATTE) and not one.has_vertex_colors for one in found):
-            return Surface(blended_matte(found[0].look, found[1].look, weight))
         heavier = found[int(weight.mean >= 0.5)]
-        mixed = blended_numbers(found[0].look, found[1].look, min(weight.mean, 1.0))
-        if mixed is None:
+        mixed = blended(found[0].look, found[1].look, weight)
+        if mixed is None or any(one.has_vertex_colors for one in found):
             import_report.changed(f"{node}: is the heavier of the two that it blends")
             return heavier
-        import_report.changed(f"{node}: the numbers of its two BSDFs are mixed, not what they reflect")
-        return replace(heavier, look=mixed)
+        if any(set(one.look) != set(MATTE) for one in found):
+            import_report.changed(f"{node}: the numbers of its two BSDFs are mixed, not what they reflect")
+        return Surface(mixed)
 
 
 _KINDS: dict[str, Callable[[Materials, Node], Surface]] = {

@@ -26,6 +26,7 @@ from incpt.scene.texture import Texture
 Array = npt.NDArray[np.float64]
 FILES = ("obj", "ply", "serialized")
 """Shapes that a file holds."""
+_GREY = (0.5, 0.5, 0.5, 1.0)
 _ROUND = ("sphere", "cylinder", "disk")
 """Those that are no meshes in Mitsuba."""
 PlacedMesh = tuple[Mesh, Array]
@@ -95,7 +96,9 @@ class Meshes:
         if key not in self._variants:
             made = mesh
             if surface.has_vertex_colors and made.colors is None:
-                import_report.left_out(f"colours at the vertices of {node}: the mesh has none that are read")
+                what = f"colours at the vertices of {node}"
+                import_report.left_out(f"{what}: the mesh has none that are read; grey stands for them")
+                made = _changed(made, colors=np.full((len(made.faces), 3, 4), _GREY, np.float32))
             if is_flat and made.normals is not None:
                 made = _changed(made, normals=None)
             elif not is_flat and made.normals is None and node.kind in FILES:

@@ -25,8 +25,9 @@ from incpt.scene.material import Material
 from incpt.scene.model import CAMERA_NAME, Object, Scene
 
 Array = npt.NDArray[np.float64]
-MOST_BOUNCES = 64
-"""Of paths without a `max_depth`: Russian roulette ends nearly all before."""
+MOST_BOUNCES = 200
+"""Of paths without a `max_depth`: Russian roulette ends nearly all before, but for those that are caught in
+clear bodies."""
 _PATH_INTEGRATORS = ("path", "volpath", "volpathmis", "prb", "prbvolpath", "prb_basic", "ptracer", "direct")
 """Those whose picture is that of a path tracer."""
 
@@ -115,7 +116,7 @@ def _settings(root: Node, film: Film | None, materials: dict[str, Material]) -> 
             node.ignore("shading_samples", "emitter_samples", "bsdf_samples", "samples_per_pass")
     if depth in (0, 1):
         import_report.changed(f"max_depth: paths of {depth} are those of 2 here, which have direct light")
-    bounces = MOST_BOUNCES if depth < 0 else min(max(depth - 2, 0), 200)
+    bounces = MOST_BOUNCES if depth < 0 else min(max(depth - 2, 0), MOST_BOUNCES)
     if depth >= 0 and any(material.is_transmissive for material in materials.values()):
         import_report.changed(
             f"max_depth: what goes through smooth glass counts apart, up to {MOST_BOUNCES} times"

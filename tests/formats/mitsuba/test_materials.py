@@ -196,9 +196,29 @@ def test_other_blends_are_the_nearest(tmp_path: Path) -> None:
     rough = bsdf("roughplastic", number("alpha", 0.04)) + bsdf("roughplastic", number("alpha", 0.36))
     mixed = material_of(tmp_path, bsdf("blendbsdf", number("weight", 0.5) + rough))
     assert mixed.roughness == pytest.approx(0.4)
-    unlike = bsdf("diffuse", RED) + bsdf("conductor")
-    assert material_of(tmp_path, bsdf("blendbsdf", number("weight", 0.6) + unlike)).metallic == 1
-    assert material_of(tmp_path, bsdf("blendbsdf", number("weight", 0.4) + unlike)).metallic == 0
+    metal = bsdf("plastic", rgb("diffuse_reflectance", ".2 .4 .6")) + bsdf(
+        "roughconductor", number("alpha", 0.25)
+    )
+    half = material_of(tmp_path, bsdf("blendbsdf", number("weight", 0.5) + metal))
+    assert (half.metallic, half.roughness, half.ior) == (0.5, 0.25, 1.49 / AIR)
+    np.testing.assert_allclose(half.base_color, [0.6, 0.7, 0.8])
+    unlike = bsdf("diffuse", RED) + bsdf("dielectric")
+    assert material_of(tmp_path, bsdf("blendbsdf", number("weight", 0.6) + unlike)).transmission == 1
+    assert material_of(tmp_path, bsdf("blendbsdf", number("weight", 0.4) + unlike)).transmission == 0
+
+
+def test_metal_and_paint_are_woven_by_an_image(tmp_path: Path) -> None:
+    write_image(tmp_path / "w.png", [[0, 255], [255, 0]])
+    pair = bsdf("diffuse", RED) + bsdf("roughconductor", number("alpha", 0.25))
+    material = material_of(tmp_path, bsdf("blendbsdf", image("weight", "w.png") + pair))
+    base, rough, specular = (
+        material.base_color_texture, material.metallic_roughness_texture, material.specular_texture,
+    )  # fmt: skip
+    assert base is not None and rough is not None and specular is not None
+    # At each place either the one or the other.
+    np.testing.assert_allclose(base.bitmap.pixels[0], [[0.8, 0.2, 0.2], [1, 1, 1]], atol=1e-6)
+    np.testing.assert_allclose(rough.bitmap.pixels[0, :, 1:], [[1, 0], [0.5, 1]], atol=1e-6)
+    np.testing.assert_allclose(specular.bitmap.pixels[0, :, 3], [0, 1], atol=1e-6)
 
 
 def test_bumps_and_normals(tmp_path: Path) -> None:
@@ -290,7 +310,7 @@ CHANGED = {
     bsdf("twosided", bsdf("diffuse") + bsdf("diffuse", RED)): "its back looks like its front",
     bsdf("diffuse", rgb("reflectance", "1.5 .2 .2")): "1.5, 0.2, 0.2 is limited to 0 to 1",
     bsdf("principled"): "like Disney's but not the same",
-    bsdf("blendbsdf", number("weight", 0.5) + bsdf("diffuse") + bsdf("conductor")): "the heavier of the two",
+    bsdf("blendbsdf", number("weight", 0.5) + bsdf("diffuse") + bsdf("dielectric")): "the heavier of the two",
     bsdf("dielectric", number("specular_reflectance", 0.5)): "what is not reflected goes through",
 }
 

@@ -184,7 +184,12 @@ def test_colours_of_vertices_count_where_they_are_asked_for(tmp_path: Path) -> N
     np.testing.assert_array_equal(mesh.colors[0], [[1, 0, 0, 1], [1, 0, 0, 1], [0, 1, 0, 1]])
     assert shape_of(tmp_path, body.format("")).mesh.colors is None
     (tmp_path / "a.ply").write_text(PLY)
-    assert any("colours at the vertices" in text for text in told(read(tmp_path, body.format(attribute))[1]))
+    scene, report = read(tmp_path, body.format(attribute))
+    assert any("colours at the vertices" in text for text in told(report))
+    # Grey stands for them.
+    np.testing.assert_array_equal(
+        scene.objects[0].mesh.colors, np.broadcast_to([0.5, 0.5, 0.5, 1], (2, 3, 4))
+    )
 
 
 def test_instances_share_the_meshes_of_their_group(tmp_path: Path) -> None:
