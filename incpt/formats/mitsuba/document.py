@@ -192,11 +192,14 @@ class _Reader:
             attributes = self._document.substituted(element.attributes)
             tag, name = element.tag, self._new_name(attributes.get("name", ""))
             is_object = tag in OBJECT_TAGS or (tag == "spectrum" and "type" in attributes)
+            if not is_object and not name and tag in (*VALUE_TAGS, "transform"):
+                raise InputError(f"<{tag}> has no name; name the property that it is")
             if tag in VALUE_TAGS and not is_object:
-                with in_place(name or f"<{tag}> without a name"):
+                with in_place(name):
                     self._set(parent, name, value_of(tag, attributes, self._document.file))
             elif tag == "transform":
-                self._set(parent, name, self._transform(element))
+                with in_place(name):
+                    self._set(parent, name, self._transform(element))
             elif not is_object:
                 self._command(element, attributes, name, parent)
         if is_object:

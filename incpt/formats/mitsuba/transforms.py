@@ -9,9 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core.errors import InputError
+from incpt.formats import import_report
 from incpt.formats.mitsuba.xml_file import Element
 
 Array = npt.NDArray[np.float64]
+_UNIT = 1e-3
+"""How far from 1 the length of an axis may be. Mitsuba 3 takes it as it is, where another one distorts."""
 
 
 def words(text: str) -> list[str]:
@@ -70,6 +73,8 @@ def _rotate(attributes: Mapping[str, str]) -> Array:
     length = float(np.linalg.norm(axis))
     if length == 0:
         raise InputError("the axis of <rotate> has no length; give it one of x, y and z")
+    if abs(length - 1) > _UNIT:
+        import_report.changed(f"a <rotate> about an axis of length {length:.4g}: turns, and does not stretch")
     angle = math.radians(number(attributes.get("angle", "")))
     x, y, z = axis / length
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])

@@ -92,6 +92,7 @@ WRONG = {
     SHAPE.format('<float name="radius" value="$r"/>'): "line 2: the parameter $r has no value",
     SHAPE.format('<boolean name="flip_normals" value="1"/>'): "'1' is neither true nor false",
     SHAPE.format('<point name="center" value="1 2"/>'): "center: '1 2' holds 2 numbers",
+    SHAPE.format('<float value="1"/>'): "line 2: <float> has no name",
     SHAPE.format('<float name="a" value="1"/>' * 2): "line 2: a: is given twice",
     SHAPE.format('<transform name="to_world"><turn/></transform>'): "<turn> is no step of a transform",
     SHAPE.format('<transform name="to_world"><rotate angle="9"/></transform>'): "<rotate> has no length",

@@ -14,6 +14,7 @@ from support.mitsuba_files import read, told, write_image, written
 
 from incpt.core.errors import InputError
 from incpt.formats import registry, scene_save
+from incpt.formats.import_report import Fate
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object
 
@@ -98,6 +99,13 @@ def test_steps_of_a_transform_follow_each_other(tmp_path: Path) -> None:
         tmp_path, '<shape type="cube"><transform name="to_world"><scale x="-1"/></transform></shape>'
     )
     assert ((facing(mirrored) * world(mirrored).mean(axis=1)).sum(axis=1) > 0).all()
+
+
+def test_an_axis_of_any_length_only_turns(tmp_path: Path) -> None:
+    turn = '<transform name="to_world"><rotate y="2" angle="90"/></transform>'
+    scene, report = read(tmp_path, f'<shape type="cube">{turn}</shape>')
+    np.testing.assert_allclose(scene.objects[0].world_bounds, [[-1] * 3, [1] * 3], atol=1e-9)
+    assert any("axis of length 2" in text for text in told(report, Fate.CHANGED))
 
 
 def test_longitudes_of_a_sphere(tmp_path: Path) -> None:
