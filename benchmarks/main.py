@@ -9,7 +9,7 @@ import typer
 from incpt.benchmarks import report
 from incpt.benchmarks.impact import command
 from incpt.benchmarks.measures import build, latency, rays, scale, screenshots, soak, steps, sweep, table51
-from incpt.benchmarks.peers import compare
+from incpt.benchmarks.peers import agreement, compare
 from incpt.core.errors import InputError
 
 app = typer.Typer(
@@ -26,6 +26,7 @@ app.command("table51")(table51.table51)
 app.command("impact")(command.impact)
 app.command("rays")(rays.rays)
 app.command("peers")(compare.peers)
+app.command("agreement")(agreement.agreement)
 app.command("build")(build.build)
 app.command("scale")(scale.scale)
 app.command("steps")(steps.steps)
