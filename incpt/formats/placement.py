@@ -74,6 +74,18 @@ def placed_mesh(mesh: Mesh, matrix: npt.NDArray[np.float64], source: MeshSource)
     )
 
 
+def turned_over(mesh: Mesh) -> Mesh:
+    """A mesh with its inside out, which is that of no file."""
+
+    def turned(values: Any) -> Any:
+        return None if values is None else values[:, ::-1]
+
+    normals = None if mesh.normals is None else -turned(mesh.normals)
+    uvs = tuple(turned(one) for one in mesh.uvs)
+    colors, tangents = turned(mesh.colors), turned(mesh.tangents)
+    return Mesh(mesh.vertices, mesh.faces[:, ::-1], normals, MeshSource(), uvs, colors, tangents)
+
+
 def _unit(vectors: Array) -> npt.NDArray[np.float32]:
     result: npt.NDArray[np.float32] = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
     return result.astype(np.float32)

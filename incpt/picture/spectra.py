@@ -6,6 +6,7 @@ linear, and outside of which it is 0.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -64,6 +65,15 @@ _DAYLIGHT = np.array(
     ]
 )  # fmt: skip
 """(81,) power of the illuminant D65, 100 at 560 nm (CIE 015:2018, table 5)."""
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Values at wavelengths in nanometres, in ascending order. Without wavelengths one value is that of all
+    of them."""
+
+    wavelengths: tuple[float, ...]
+    values: tuple[float, ...]
 
 
 def reflected_color(wavelengths: npt.ArrayLike, values: npt.ArrayLike) -> Array:

@@ -13,9 +13,11 @@ from incpt.core import affine
 from incpt.core.affine import Vector
 from incpt.core.errors import InputError, in_place
 from incpt.formats import images, import_report
+from incpt.formats.appearance.colored import linear_pixels
+from incpt.formats.lat_long import turned
 from incpt.formats.mitsuba.document import Document
 from incpt.formats.mitsuba.node import Node
-from incpt.formats.mitsuba.textures import Textures, linear_pixels
+from incpt.formats.mitsuba.textures import Textures
 from incpt.formats.names import Names
 from incpt.scene.environment import Environment
 from incpt.scene.image import Image
@@ -202,40 +204,4 @@ def _turned(node: Node, environment: Environment, turn: Array) -> Environment:
     picture = environment.picture
     assert picture is not None
     import_report.changed(f"{node}: is turned off the y axis, for which its image is made anew")
-    return replace(environment, image=Image(_resampled(picture.pixels, turn)), sky=None)
-
-
-def _resampled(pixels: npt.NDArray[np.float32], turn: Array) -> npt.NDArray[np.float32]:
-    """(H, W, 3) a lat-long image that shows along turn @ d what another one shows along d: of each pixel the
-    mean over four places, between pixels."""
-    height, width = pixels.shape[:2]
-    made = np.zeros_like(pixels)
-    back = np.linalg.inv(turn)
-    for row in range(height):
-        for down in (0.25, 0.75):
-            latitude = math.pi * (0.5 - (row + down) / height)
-            for right in (0.25, 0.75):
-                longitude = 2 * np.pi * ((np.arange(width) + right) / width - 0.5)
-                flat = math.cos(latitude)
-                # The middle of the image looks to +z, three quarters to the right is -x.
-                ways = np.stack(
-                    [-flat * np.sin(longitude), np.full(width, math.sin(latitude)), flat * np.cos(longitude)]
-                )
-                made[row] += _seen(pixels, back @ ways) / 4
-    return made
-
-
-def _seen(pixels: npt.NDArray[np.float32], ways: Array) -> npt.NDArray[np.float32]:
-    """(N, 3) what a lat-long image shows along directions (3, N) of any length."""
-    height, width = pixels.shape[:2]
-    x, y, z = ways / np.linalg.norm(ways, axis=0)
-    column = (np.arctan2(-x, z) / (2 * np.pi) + 0.5) * width - 0.5
-    row = np.clip((0.5 - np.arcsin(np.clip(y, -1, 1)) / np.pi) * height - 0.5, 0, height - 1)
-    left, top = np.floor(column), np.floor(row)
-    right_share, down_share = (column - left)[:, None], (row - top)[:, None]
-    i, j = left.astype(int) % width, top.astype(int)
-    k, m = (i + 1) % width, np.minimum(j + 1, height - 1)
-    above = (1 - right_share) * pixels[j, i] + right_share * pixels[j, k]
-    below = (1 - right_share) * pixels[m, i] + right_share * pixels[m, k]
-    seen: npt.NDArray[np.float32] = ((1 - down_share) * above + down_share * below).astype(np.float32)
-    return seen
+    return replace(environment, image=Image(turned(picture.pixels, turn)), sky=None)

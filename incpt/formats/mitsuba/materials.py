@@ -15,10 +15,9 @@ import numpy as np
 from incpt.core.affine import Vector
 from incpt.core.errors import InputError, in_place
 from incpt.formats import import_report
-from incpt.formats.mitsuba import metals
-from incpt.formats.mitsuba.document import Document
-from incpt.formats.mitsuba.indices import AIR, index, inner_reflectance
-from incpt.formats.mitsuba.looks import (
+from incpt.formats.appearance import metals
+from incpt.formats.appearance.colored import Amount, Colored
+from incpt.formats.appearance.looks import (
     MATTE,
     Look,
     between,
@@ -32,8 +31,10 @@ from incpt.formats.mitsuba.looks import (
     upright,
     with_alpha,
 )
+from incpt.formats.mitsuba.document import Document
+from incpt.formats.mitsuba.indices import AIR, index, inner_reflectance
 from incpt.formats.mitsuba.node import Node
-from incpt.formats.mitsuba.textures import Amount, Colored, Textures
+from incpt.formats.mitsuba.textures import Textures
 from incpt.scene.material import HIGHEST_BUMP, Material
 from incpt.scene.texture import Bitmap, Texture
 
@@ -246,9 +247,10 @@ class Materials:
         rough = textures.amount(node, "roughness", 0.5)
         metal = textures.amount(node, "metallic", 0.0)
         anisotropy = textures.share(node, "anisotropic", 0.0)
-        look = (
-            stretched(metal, rough, anisotropy) if anisotropy > 0 else metal_and_roughness(node, metal, rough)
-        )
+        if anisotropy > 0:
+            look = stretched(metal, rough, anisotropy)
+        else:
+            look = metal_and_roughness(str(node), metal, rough)
         if node.has("eta") or is_thin:
             ior = max(textures.amount(node, "eta", 1.5).mean, 1.0)
         else:
@@ -276,7 +278,7 @@ class Materials:
         if base is not None and base.bitmap.has_alpha:
             base = replace(base, bitmap=Bitmap(base.bitmap.pixels[..., :-1]))
         if opacity.image is not None:
-            base = with_alpha(node, base, opacity.image)
+            base = with_alpha(str(node), base, opacity.image)
         alpha = min(opacity.value, 1.0)
         look |= {"alpha": alpha, "alpha_mode": "blend", "base_color_texture": base}
         return replace(found, look=look)

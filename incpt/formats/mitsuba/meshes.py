@@ -20,6 +20,7 @@ from incpt.formats.mitsuba.document import Document
 from incpt.formats.mitsuba.materials import Surface
 from incpt.formats.mitsuba.node import Node
 from incpt.formats.mitsuba.serialized import read_serialized
+from incpt.formats.placement import turned_over
 from incpt.scene.mesh import Mesh, MeshSource
 from incpt.scene.texture import Texture
 
@@ -108,7 +109,7 @@ class Meshes:
             if turns_v:
                 made = _changed(made, uvs=tuple(uv * _UPSIDE_DOWN + _ONE_DOWN for uv in made.uvs))
             # The mesh is kept, so that no other gets its identity.
-            self._variants[key] = (mesh, _turned_over(made) if flips else made)
+            self._variants[key] = (mesh, turned_over(made) if flips else made)
         return self._variants[key][1]
 
 
@@ -133,22 +134,6 @@ def _turns_v(node: Node) -> bool:
 def _changed(mesh: Mesh, **values: Any) -> Mesh:
     """A mesh that is no longer that of its file."""
     return replace(mesh, source=MeshSource(), **values)
-
-
-def _turned_over(mesh: Mesh) -> Mesh:
-    """With its inside out."""
-
-    def turned(values: Any) -> Any:
-        return None if values is None else values[:, ::-1]
-
-    return _changed(
-        mesh,
-        faces=mesh.faces[:, ::-1],
-        normals=None if mesh.normals is None else -turned(mesh.normals),
-        uvs=tuple(map(turned, mesh.uvs)),
-        colors=turned(mesh.colors),
-        tangents=turned(mesh.tangents),
-    )
 
 
 def _smooth_normals(mesh: Mesh) -> npt.NDArray[np.float32]:

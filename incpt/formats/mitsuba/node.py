@@ -27,15 +27,6 @@ class Color:
     rgb: tuple[float, float, float]
 
 
-@dataclass(frozen=True)
-class Spectrum:
-    """Values at wavelengths in nanometres, in ascending order. Without wavelengths one value is that of all
-    of them."""
-
-    wavelengths: tuple[float, ...]
-    values: tuple[float, ...]
-
-
 @dataclass(eq=False)
 class Node:
     """An object: a shape, a BSDF, a texture ... `kind` is the plugin that it names, `place` says where it

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from incpt.core.errors import InputError, in_place
 from incpt.formats import import_report
+from incpt.formats.appearance.looks import Look
 from incpt.formats.mitsuba.document import Document
-from incpt.formats.mitsuba.looks import Look
 from incpt.formats.mitsuba.materials import Materials, Surface
 from incpt.formats.mitsuba.meshes import FILES, Meshes
 from incpt.formats.mitsuba.node import Node

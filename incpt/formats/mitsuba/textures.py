@@ -4,91 +4,38 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from incpt.core.affine import Vector
 from incpt.core.checks import one_of
 from incpt.core.errors import InputError, in_place
 from incpt.formats import bitmaps, import_report
+from incpt.formats.appearance.colored import (
+    LUMINANCE,
+    WHITE,
+    Amount,
+    Array,
+    Colored,
+    NumberImage,
+    linear_pixels,
+    plain_numbers,
+    vector,
+)
 from incpt.formats.mitsuba.document import Document
-from incpt.formats.mitsuba.node import Color, Node, Spectrum
+from incpt.formats.mitsuba.node import Color, Node
 from incpt.formats.mitsuba.transforms import numbers
 from incpt.formats.mitsuba.values import spectrum, spectrum_of_file
-from incpt.picture.color import linear_from_srgb
-from incpt.picture.spectra import blackbody_color, emitted_color, reflected_color
+from incpt.picture.spectra import Spectrum, blackbody_color, emitted_color, reflected_color
 from incpt.scene.texture import FILTERS, WRAPS, Bitmap, Texture
 
-Array = npt.NDArray[np.float64]
 VERTEX_COLOR = "vertex_color"
 """The attribute of a mesh that is read: what our meshes have at their corners."""
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-_WHITE = (1.0, 1.0, 1.0)
 _PLACEHOLDER = 0.5
 """What stands for an image that cannot be read: the reflectance that Mitsuba takes where none is given."""
 _SHEAR = 1e-4
-
-
-@dataclass(frozen=True, eq=False)
-class Colored:
-    """A colour `rgb`, times what a texture says, times the colours at the corners of a mesh."""
-
-    rgb: Vector
-    texture: Texture | None = None
-    is_of_vertices: bool = False
-
-    @property
-    def is_constant(self) -> bool:
-        return self.texture is None and not self.is_of_vertices
-
-    def mapped(self, change: Callable[[Array], Array]) -> Colored:
-        """With each colour (..., 3) changed."""
-        if self.texture is None:
-            return replace(self, rgb=_vector(change(np.array(self.rgb))))
-        pixels = change(linear_pixels(self.texture.bitmap)[..., :3] * self.rgb)
-        return Colored(_WHITE, replace(self.texture, bitmap=Bitmap(pixels)), self.is_of_vertices)
-
-
-@dataclass(frozen=True, eq=False)
-class NumberImage:
-    """Linear numbers (H, W), where a texture places them. Its bitmap may be in colours."""
-
-    pixels: Array
-    texture: Texture
-
-    def with_pixels(self, pixels: Array) -> Texture:
-        """The texture with a bitmap of these."""
-        return replace(self.texture, bitmap=Bitmap(pixels))
-
-
-@dataclass(frozen=True, eq=False)
-class Amount:
-    """A number, or those of an image in its place."""
-
-    value: float
-    image: NumberImage | None = None
-
-    @property
-    def mean(self) -> float:
-        return self.value if self.image is None else float(self.image.pixels.mean())
-
-
-def linear_pixels(bitmap: Bitmap) -> Array:
-    """(H, W, 3 or 4) linear colours of a bitmap whose whole numbers are in sRGB, with its alpha."""
-    pixels = bitmap.pixels
-    alpha = _plain(pixels[..., -1:]) if bitmap.has_alpha else None
-    colors = pixels[..., :-1] if bitmap.has_alpha else pixels
-    linear = colors.astype(np.float64) if pixels.dtype.kind == "f" else linear_from_srgb(_plain(colors))
-    linear = np.repeat(linear, 3, axis=2) if linear.shape[2] == 1 else linear
-    return linear if alpha is None else np.concatenate([linear, alpha], axis=2)
-
-
-def _plain(pixels: npt.NDArray[Any]) -> Array:
-    """Whole numbers as shares of the largest."""
-    return pixels / (1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max))
 
 
 class Textures:
@@ -115,7 +62,7 @@ class Textures:
         """The colour of light; 1 where none is given. Raises InputError."""
         with in_place(name):
             value = node.value(name)
-            found = Colored(_WHITE) if value is None else self._colored(value, emitted_color)
+            found = Colored(WHITE) if value is None else self._colored(value, emitted_color)
             if min(found.rgb) < 0:
                 import_report.changed(f"{name} of {node}: what is below 0 is 0")
             r, g, b = (max(c, 0.0) for c in found.rgb)
@@ -130,7 +77,7 @@ class Textures:
             if isinstance(value, Node) and value.tag == "texture":
                 return self._image_amount(value)
             found = self._colored(value, reflected_color)
-            return Amount(max(float(_LUMINANCE @ found.rgb), 0.0))
+            return Amount(max(float(LUMINANCE @ found.rgb), 0.0))
 
     def share(self, node: Node, name: str, default: float) -> float:
         """A number from 0 to 1 for which a material has no image: of an image the mean. Raises
@@ -162,9 +109,9 @@ class Textures:
             return Colored(value.rgb)
         if isinstance(value, Spectrum):
             if value.wavelengths:
-                return Colored(_vector(seen(value.wavelengths, value.values)))
+                return Colored(vector(seen(value.wavelengths, value.values)))
             # The same at all wavelengths: white as a reflectance, as light a bit red.
-            return Colored(_vector(value.values[0] * seen((300.0, 900.0), (1.0, 1.0))))
+            return Colored(vector(value.values[0] * seen((300.0, 900.0), (1.0, 1.0))))
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise InputError("is no colour; write <rgb> with three numbers")
         return Colored((float(value),) * 3)
@@ -174,14 +121,14 @@ class Textures:
         if node.kind == "blackbody":
             kelvin = node.number("temperature", 5000.0, 100.0, 1e6)
             node.ignore("wavelength_min", "wavelength_max")
-            return Color(_vector(node.number("scale", 1.0) * blackbody_color(kelvin)))
+            return Color(vector(node.number("scale", 1.0) * blackbody_color(kelvin)))
         if node.kind == "uniform":
             return Spectrum((), (node.number("value", 1.0),))
         if node.kind in ("d65", "srgb", "rgb"):
             scale = node.number("scale", 1.0)
             value = node.value("color" if node.has("color") else "value")
-            color = _WHITE if value is None else self._colored(value, reflected_color).rgb
-            return Color(_vector(scale * np.array(color)))
+            color = WHITE if value is None else self._colored(value, reflected_color).rgb
+            return Color(vector(scale * np.array(color)))
         if node.kind in ("regular", "irregular"):
             return self._measured(node)
         raise InputError(
@@ -217,11 +164,11 @@ class Textures:
             if found is None:
                 return Colored((_PLACEHOLDER,) * 3)
             if _is_raw(node) and found.bitmap.pixels.dtype.kind != "f":
-                found = replace(found, bitmap=Bitmap(_plain(found.bitmap.pixels)))
-            return Colored(_WHITE, found)
+                found = replace(found, bitmap=Bitmap(plain_numbers(found.bitmap.pixels)))
+            return Colored(WHITE, found)
         if node.kind == "checkerboard":
             first, second = (self._checker_color(node, *one) for one in (("color0", 0.4), ("color1", 0.2)))
-            return Colored(_WHITE, self._checkerboard(node, np.array([[first, second], [second, first]])))
+            return Colored(WHITE, self._checkerboard(node, np.array([[first, second], [second, first]])))
         if node.kind == "mesh_attribute":
             return _mesh_attribute(node)
         import_report.left_out(f"{node}: textures of that type are not read; grey stands for it")
@@ -232,7 +179,7 @@ class Textures:
         found = self.reflectance(node, name, default)
         if found.texture is not None:
             import_report.changed(f"{name} of {node}: the mean of its image")
-            return _vector(linear_pixels(found.texture.bitmap)[..., :3].mean(axis=(0, 1)) * found.rgb)
+            return vector(linear_pixels(found.texture.bitmap)[..., :3].mean(axis=(0, 1)) * found.rgb)
         return found.rgb
 
     def _checkerboard(self, node: Node, pixels: Array) -> Texture:
@@ -277,21 +224,21 @@ class Textures:
     def _new_amount(self, node: Node) -> Amount:
         if node.kind == "checkerboard":
             first, second = (
-                float(_LUMINANCE @ self._checker_color(node, *one))
+                float(LUMINANCE @ self._checker_color(node, *one))
                 for one in (("color0", 0.4), ("color1", 0.2))
             )
             # Where Mitsuba reads numbers of it, its two colours have changed places ("checkerboard.cpp").
             values = np.array([[second, first], [first, second]])
             return Amount(1.0, NumberImage(values, self._checkerboard(node, values)))
         if node.kind != "bitmap":
-            return Amount(float(_LUMINANCE @ self._texture(node).rgb))
+            return Amount(float(LUMINANCE @ self._texture(node).rgb))
         found = self._bitmap(node)
         if found is None:
             return Amount(_PLACEHOLDER)
         pixels = found.bitmap.pixels
-        linear = _plain(pixels) if _is_raw(node) else linear_pixels(found.bitmap)
+        linear = plain_numbers(pixels) if _is_raw(node) else linear_pixels(found.bitmap)
         has_color = linear.shape[2] >= 3
-        values = linear[..., :3] @ _LUMINANCE if has_color else linear[..., 0]
+        values = linear[..., :3] @ LUMINANCE if has_color else linear[..., 0]
         return Amount(1.0, NumberImage(np.maximum(values, 0.0), found))
 
 
@@ -308,8 +255,3 @@ def _mesh_attribute(node: Node) -> Colored:
         )
         return Colored((_PLACEHOLDER,) * 3)
     return Colored((scale,) * 3, is_of_vertices=True)
-
-
-def _vector(values: npt.ArrayLike) -> Vector:
-    r, g, b = np.asarray(values, np.float64).tolist()
-    return r, g, b

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from incpt.core.errors import InputError
 from incpt.core.files import read_bytes
-from incpt.formats.mitsuba.node import Color, Spectrum
+from incpt.formats.mitsuba.node import Color
 from incpt.formats.mitsuba.transforms import number, numbers, vector, words
 from incpt.picture.color import linear_from_srgb
-from incpt.picture.spectra import blackbody_color
+from incpt.picture.spectra import Spectrum, blackbody_color
 from incpt.scene.checks import LARGEST
 
 Attributes = Mapping[str, str]

@@ -13,7 +13,7 @@ from support.mitsuba_files import read, told, write_image
 from incpt.core import affine
 from incpt.formats import images
 from incpt.formats.import_report import Fate
-from incpt.formats.mitsuba.emitters import _resampled
+from incpt.formats.lat_long import turned as turned_image
 from incpt.picture.spectra import blackbody_color, emitted_color
 from incpt.scene.environment import Environment
 
@@ -143,7 +143,7 @@ def test_environments_are_turned_as_theirs(turn: str, tmp_path: Path) -> None:
 
 def test_a_turned_image_keeps_its_light() -> None:
     pixels = np.random.default_rng(3).random((48, 96, 3)).astype(np.float32)
-    turned = _resampled(pixels, affine.rotation_matrix((40.0, 20.0, 70.0)))
+    turned = turned_image(pixels, affine.rotation_matrix((40.0, 20.0, 70.0)))
 
     def light(image: npt.NDArray[np.float32]) -> Array:
         weights = np.sin((np.arange(48) + 0.5) * np.pi / 48)[:, None, None]

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from support.mitsuba_files import SENSOR, material_of, read, told, write_image
 
+from incpt.formats.appearance.colored import linear_pixels
 from incpt.formats.import_report import Fate
 from incpt.formats.mitsuba.indices import inner_reflectance
-from incpt.formats.mitsuba.textures import linear_pixels
 from incpt.picture.color import linear_from_srgb
 from incpt.scene.material import Material
 

@@ -12,8 +12,7 @@ import numpy.typing as npt
 
 from incpt.core.affine import Vector
 from incpt.core.errors import InputError
-from incpt.formats.mitsuba.node import Spectrum
-from incpt.picture.spectra import reflected_color
+from incpt.picture.spectra import Spectrum, reflected_color
 
 Array = npt.NDArray[np.float64]
 

@@ -10,8 +10,7 @@ import numpy as np
 
 from incpt.core.affine import Vector
 from incpt.formats import import_report
-from incpt.formats.mitsuba.node import Node
-from incpt.formats.mitsuba.textures import Amount, Array, Colored, NumberImage, linear_pixels
+from incpt.formats.appearance.colored import Amount, Array, Colored, NumberImage, linear_pixels
 from incpt.scene.material import Material
 from incpt.scene.texture import Bitmap, Texture
 
@@ -41,18 +40,18 @@ def _packed(place: NumberImage, roughness: Array | float, metallic: Array | floa
     return place.with_pixels(np.clip(np.stack([red, green, blue], axis=2), 0, 1))
 
 
-def metal_and_roughness(node: Node, metal: Amount, rough: Amount) -> Look:
+def metal_and_roughness(place: str, metal: Amount, rough: Amount) -> Look:
     """Of Disney's BSDF, where alpha is the square of roughness too."""
-    place = rough.image or metal.image
-    if place is None:
+    lies = rough.image or metal.image
+    if lies is None:
         return {"metallic": min(metal.value, 1.0), "roughness": min(rough.value, 1.0)}
-    if metal.image is not None and not _lie_alike(metal.image, place):
+    if metal.image is not None and not _lie_alike(metal.image, lies):
         import_report.changed(
-            f"metallic of {node}: the mean of its image, which lies otherwise than roughness"
+            f"metallic of {place}: the mean of its image, which lies otherwise than roughness"
         )
         metal = Amount(metal.mean)
     green, blue = (one.value if one.image is None else one.image.pixels for one in (rough, metal))
-    return {"metallic": 1.0, "roughness": 1.0, "metallic_roughness_texture": _packed(place, green, blue)}
+    return {"metallic": 1.0, "roughness": 1.0, "metallic_roughness_texture": _packed(lies, green, blue)}
 
 
 def stretched(metal: Amount, rough: Amount, anisotropy: float) -> Look:
@@ -74,13 +73,13 @@ def _is_placed_alike(first: Texture, second: Texture) -> bool:
     return replace(first, bitmap=second.bitmap) == second
 
 
-def with_alpha(node: Node, base: Texture | None, opacity: NumberImage) -> Texture:
+def with_alpha(place: str, base: Texture | None, opacity: NumberImage) -> Texture:
     """A texture of a base colour whose alpha is an opacity."""
     alpha = np.clip(opacity.pixels, 0, 1)[..., None]
     if base is None:
         return opacity.with_pixels(np.concatenate([np.ones((*alpha.shape[:2], 3)), alpha], axis=2))
     if not _is_placed_alike(base, opacity.texture):
-        import_report.changed(f"opacity of {node}: lies as the colour beside it does")
+        import_report.changed(f"opacity of {place}: lies as the colour beside it does")
     colors = linear_pixels(base.bitmap)[..., :3]
     height, width = (max(pair) for pair in zip(colors.shape[:2], alpha.shape[:2], strict=True))
     both = [_resized(one, height, width) for one in (colors, alpha)]
