@@ -11,6 +11,7 @@ from reference.markdown import code, table
 _READERS = {
     "gltf.reader": "glTF 2.0, by a reader of our own",
     "mitsuba.reader": "scenes of Mitsuba 3, by a reader of our own",
+    "pbrt.reader": "scenes of pbrt-v4, by a reader of our own",
     "obj.reader": "OBJ with MTL, by a reader of our own",
     "ply.reader": "by a reader of our own",
     "stl": "by a reader of our own",

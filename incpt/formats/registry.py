@@ -70,6 +70,7 @@ _TRIMESH = ("trimesh_adapter", "read_with_trimesh")
 FORMATS = (
     Format(".toml", FileKind.SCENE, ("scene_toml", "load_scene_toml")),
     Format(".xml", FileKind.SCENE, ("mitsuba.reader", "read_mitsuba")),
+    Format(".pbrt", FileKind.SCENE, ("pbrt.reader", "read_pbrt")),
     OPENEXR,
     *(Format(suffix, FileKind.IMAGE, ("images", "read_other")) for suffix in _OTHER_IMAGES),
     Format(".glb", FileKind.MESH, _GLTF, says_units=True),
@@ -110,7 +111,7 @@ def load(
     up: str | None = None,
     unit: float | None = None,
 ) -> Scene:
-    """A scene from a scene file (.toml, .xml of Mitsuba), or a default scene around a mesh file.
+    """A scene from a scene file (.toml, .xml of Mitsuba, .pbrt), or a default scene around a mesh file.
 
     `time`: seconds into the animations of its files; None leaves them out. `allow_outside`: a glTF file may
     name files outside its own folder. `up` ("y" or "z") and `unit` (metres) say how a mesh file is meant

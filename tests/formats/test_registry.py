@@ -35,7 +35,9 @@ def test_formats_of_trimesh_are_available_where_trimesh_says_so() -> None:
 def test_a_row_is_all_that_a_format_needs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "cube.TRI"
     mesh_store.store_mesh(path, shape("cube"))
-    with pytest.raises(InputError, match=r"cannot be read; use a scene \(\.toml, \.xml\) or a mesh \(\.glb"):
+    with pytest.raises(
+        InputError, match=r"cannot be read; use a scene \(\.toml, \.xml, \.pbrt\) or a mesh \(\.glb"
+    ):
         registry.load(path)
     row = Format(".tri", FileKind.MESH, ("mesh_store", "read_stored"))
     monkeypatch.setattr(registry, "FORMATS", (*FORMATS, row))

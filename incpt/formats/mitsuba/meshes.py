@@ -13,9 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core.errors import InputError, in_place
-from incpt.formats import import_report, mesh_files
+from incpt.formats import import_report, mesh_files, primitive_shapes
 from incpt.formats.import_options import current_options, reading_with
-from incpt.formats.mitsuba import built_in
 from incpt.formats.mitsuba.document import Document
 from incpt.formats.mitsuba.materials import Surface
 from incpt.formats.mitsuba.node import Node
@@ -55,7 +54,7 @@ class Meshes:
             return {}
         matrix = np.eye(4)
         if node.kind == "sphere":
-            matrix[:3] = built_in.SPHERE_FROM_OURS * node.number("radius", 1.0, 0.0)
+            matrix[:3] = primitive_shapes.SPHERE_FROM_OURS * node.number("radius", 1.0, 0.0)
             matrix[:3, 3] = node.vector("center", (0.0, 0.0, 0.0))
         elif node.kind == "cylinder":
             matrix = _along(node)
@@ -114,11 +113,11 @@ class Meshes:
 
 
 _BUILT_IN: dict[str, Callable[[], Mesh]] = {
-    "rectangle": built_in.rectangle,
-    "cube": built_in.cube,
-    "disk": built_in.disk,
-    "cylinder": built_in.cylinder,
-    "sphere": built_in.sphere,
+    "rectangle": primitive_shapes.rectangle,
+    "cube": primitive_shapes.cube,
+    "disk": primitive_shapes.disk,
+    "cylinder": primitive_shapes.cylinder,
+    "sphere": primitive_shapes.sphere,
 }
 _UPSIDE_DOWN, _ONE_DOWN = np.array([1, -1], np.float32), np.array([0, 1], np.float32)
 

@@ -1,6 +1,7 @@
-"""The shapes that Mitsuba makes itself, as meshes: in its own axes, with its texture coordinates.
+"""The shapes that other renderers make themselves, as meshes: in the axes of Mitsuba and pbrt, with the
+texture coordinates of Mitsuba.
 
-Where it traces the round ones exactly, these have as many segments as ours.
+Where they trace the round ones exactly, these have as many segments as ours.
 """
 
 from __future__ import annotations

@@ -1,0 +1,1 @@
+"""Scenes of pbrt-v4: `reader.read_pbrt` makes a Scene of one."""
