@@ -19,6 +19,7 @@ from incpt.formats.mitsuba.document import Document
 from incpt.formats.mitsuba.node import Node
 from incpt.formats.mitsuba.textures import Textures
 from incpt.formats.names import Names
+from incpt.picture.spectra import LUMINANCE_INTEGRAL
 from incpt.scene.environment import Environment
 from incpt.scene.image import Image
 from incpt.scene.light import Light
@@ -117,23 +118,25 @@ class Emitters:
         self._surround(node, _turned(node, Environment((1.0, 1.0, 1.0), image, intensity=scale), turn))
 
     def sunsky(self, node: Node) -> None:
-        """A clear sky of another model, with its sun where it is told."""
+        """A clear sky of another model, with its sun where it is told. Ours is in W / (m² sr) for red, green
+        and blue; theirs is as bright as light of one W / (m² sr nm) is 1."""
         turn = node.matrix("to_world")[:3, :3]
         if not node.has("sun_direction"):
             node.ignore(*node.values)
             import_report.left_out(f"{node}: is not placed by sun_direction; write one")
             return
-        sun = turn @ node.vector("sun_direction", (0.0, 0.0, 1.0))
-        up = turn @ np.array([0.0, 0.0, 1.0])
+        # The sun's direction is told in the world, and the zenith is z before the transform.
+        sun, up = node.vector("sun_direction", (0.0, 0.0, 1.0)), turn @ np.array([0.0, 0.0, 1.0])
+        if not (np.linalg.norm(sun) > 0 and np.linalg.norm(up) > 0):
+            raise InputError("sun_direction: has no length; write one such as 0, 0, 1")
         sun, up = sun / np.linalg.norm(sun), up / np.linalg.norm(up)
         import_report.changed(f"{node}: is a sky that scatters once, of another model")
-        ground = min(max(float(np.mean(self._textures.reflectance(node, "albedo", 0.3).rgb)), 0.0), 1.0)
         turbidity = node.number("turbidity", 3.0, 1.0, 10.0)
-        scale = node.number("sky_scale", 1.0, 0.0)
+        scale = node.number("sky_scale", 1.0, 0.0) / LUMINANCE_INTEGRAL
         sky = Sky(
             sun_elevation=math.degrees(math.asin(float(np.clip(sun @ up, -1, 1)))),
             dust=(turbidity - 1) / (_SOLAR_DUST - 1),
-            ground=ground,
+            ground=0.0,
             sun_disc=False,
         )
         node.ignore(*node.values)
@@ -143,7 +146,7 @@ class Emitters:
         frame = np.column_stack([np.cross(up, ahead), up, ahead])
         self._surround(node, _turned(node, Environment((1.0, 1.0, 1.0), sky=sky, intensity=scale), frame))
         irradiance = np.array(replace(sky, sun_disc=True).sun_irradiance)
-        irradiance *= node.number("sun_scale", 1.0, 0.0)
+        irradiance *= node.number("sun_scale", 1.0, 0.0) / LUMINANCE_INTEGRAL
         if irradiance.max() > 0:
             self.lights.append(_sun(self._name(node), -sun, tuple(irradiance.tolist()), sky.sun_size))
 

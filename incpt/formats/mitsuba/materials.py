@@ -60,14 +60,14 @@ class Materials:
     document: Document
     textures: Textures
     _made: dict[int, Surface] = field(default_factory=dict)
-    _inside: set[float] = field(default_factory=set)
+    _bodies: list[tuple[float, float]] = field(default_factory=list)
     _one_sided: set[int] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         for node in self.document.nodes:
             if node.tag == "bsdf" and node.kind in ("dielectric", "roughdielectric"):
                 with in_place(node.place):
-                    self._inside.add(index(node, "int_ior", "bk7"))
+                    self._bodies.append((index(node, "int_ior", "bk7"), index(node, "ext_ior", "air")))
 
     def of_shape(self, node: Node | None) -> Surface:
         """What a shape with that BSDF looks like. Raises InputError."""
@@ -197,17 +197,28 @@ class Materials:
         return Surface({**look, **tinted(color), **reflection}, color.is_of_vertices)
 
     def _body(self, node: Node, inside: float, outside: float) -> Look:
-        """The index of refraction of a body. Here bodies within others know what is around them."""
-        is_nested = any(abs(other - outside) < _SAME_INDEX for other in self._inside)
-        if outside > _AIR_LIKE and is_nested:
+        """The index of refraction of a body. Here bodies within others know what is around them: of two that
+        overlap the one that stands deeper counts."""
+        depth = self._depth(outside)
+        holds_others = any(_is_same(inside, around) for _, around in self._bodies if around > _AIR_LIKE)
+        # The highest priority, 0, is that of bodies which hold no others.
+        priority = {"priority": depth} if holds_others else {}
+        if depth > 1:
             import_report.changed(f"ext_ior of {node}: follows from the body around it")
-            return {"ior": max(inside / AIR, 1.0), "priority": 1}
+            return {"ior": max(inside / AIR, 1.0), **priority}
         if inside < outside:
             import_report.changed(
                 f"{node}: a body that is thinner than what is around it is taken for the denser"
             )
-            return {"ior": outside / inside}
-        return {"ior": inside / outside}
+            return {"ior": outside / inside, **priority}
+        return {"ior": inside / outside, **priority}
+
+    def _depth(self, outside: float, deepest: int = 8) -> int:
+        """How many bodies one stands in, itself included, by what is around each."""
+        if outside <= _AIR_LIKE or deepest == 0:
+            return 1
+        around = next((other for inner, other in self._bodies if _is_same(inner, outside)), None)
+        return 1 if around is None else 1 + self._depth(around, deepest - 1)
 
     def thindielectric(self, node: Node) -> Surface:
         ior = max(index(node, "int_ior", "bk7") / index(node, "ext_ior", "air"), 1.0)
@@ -343,6 +354,13 @@ _KINDS: dict[str, Callable[[Materials, Node], Surface]] = {
     "blendbsdf": Materials.blendbsdf,
 }
 """What reads each type of BSDF."""
+
+
+def _is_same(first: float, second: float) -> bool:
+    """Whether two indices of refraction are those of one substance."""
+    return abs(first - second) < _SAME_INDEX
+
+
 _WRAPPERS = ("mask", "bumpmap", "normalmap", "blendbsdf")
 _ONE_SIDED = ("diffuse", "conductor", "roughconductor", "plastic", "roughplastic", "pplastic", "principled")
 

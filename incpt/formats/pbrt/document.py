@@ -171,6 +171,7 @@ class Document:
         target = {"Shape": "shape", "LightSource": "light", "Material": "material", "Texture": "texture"}
         for wanted, defaults in self._state.attributes:
             if wanted == target.get(directive):
+                statement.defaults.update(defaults.keys() - statement.parameters.keys())
                 statement.parameters = {**defaults, **statement.parameters}
         self.statements.append(statement)
         placed = Placed(statement, self._state)

@@ -28,13 +28,15 @@ class Parameter:
 
 @dataclass(eq=False)
 class Statement:
-    """A directive with its type and parameters. `place` says where it stands in the file."""
+    """A directive with its type and parameters. `place` says where it stands in the file. Parameters of its
+    `defaults` were given for all statements of a kind, of which it need not use them."""
 
     directive: str
     kind: str
     place: str
     parameters: dict[str, Parameter] = field(default_factory=dict)
     asked: set[str] = field(default_factory=set)
+    defaults: set[str] = field(default_factory=set)
 
     def __str__(self) -> str:
         return (
@@ -128,4 +130,4 @@ class Statement:
 
     def unread(self) -> list[str]:
         """Names of parameters that nobody has asked for."""
-        return [name for name in self.parameters if name not in self.asked]
+        return [name for name in self.parameters if name not in self.asked | self.defaults]

@@ -157,11 +157,11 @@ def test_a_sky_stands_where_its_sun_is_told(tmp_path: Path) -> None:
         tmp_path,
         emitter(
             "sunsky",
-            '<vector name="sun_direction" x="0.6" y="0" z="0.8"/>'
+            '<vector name="sun_direction" x="0.6" y="0.8" z="0"/>'
             '<transform name="to_world"><rotate x="1" angle="-90"/></transform>',
         ),
     )
-    # z becomes y, so that the sun stands 53 degrees high over +x.
+    # The zenith is y, and the sun stands 53 degrees high over +x.
     (sun,) = scene.lights
     np.testing.assert_allclose(sun.axes[2], [0.6, 0.8, 0], atol=1e-9)
     assert scene.environment.sky is not None

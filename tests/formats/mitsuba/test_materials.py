@@ -71,17 +71,16 @@ def test_dielectrics(tmp_path: Path) -> None:
 
 
 def test_bodies_within_bodies_know_what_is_around_them(tmp_path: Path) -> None:
-    scene, report = read(
-        tmp_path,
-        '<shape type="sphere"><float name="radius" value="2"/>'
-        + bsdf("dielectric", number("int_ior", 1.5))
-        + '</shape><shape type="sphere">'
-        + bsdf("dielectric", number("int_ior", 1.0) + number("ext_ior", 1.5))
-        + "</shape>",
+    indices = ((1.333, 1.0), (1.5, 1.333), (1.0, 1.5))
+    bodies = (
+        bsdf("dielectric", number("int_ior", one) + number("ext_ior", around)) for one, around in indices
     )
-    outer, inner = (scene.materials[one.material] for one in scene.objects)
-    assert outer.ior == pytest.approx(1.5 / AIR) and (inner.ior, inner.priority) == (1, 1)
-    assert any("ext_ior" in text for text in told(report, Fate.CHANGED))
+    scene, report = read(tmp_path, "\n".join(f'<shape type="sphere">{body}</shape>' for body in bodies))
+    water, glass, bubble = (scene.materials[one.material] for one in scene.objects)
+    assert (water.ior, glass.ior, bubble.ior) == (1.333, pytest.approx(1.5 / AIR), 1)
+    # The deeper one counts where they overlap, and 0 is the highest priority.
+    assert (water.priority, glass.priority, bubble.priority) == (1, 2, 0)
+    assert sum("ext_ior" in text for text in told(report, Fate.CHANGED)) == 2
     alone = material_of(tmp_path, bsdf("dielectric", number("int_ior", 1.0) + number("ext_ior", 1.5)))
     assert (alone.ior, alone.priority) == (1.5, 0)
 

@@ -135,12 +135,17 @@ def test_transforms_follow_each_other(tmp_path: Path) -> None:
         tmp_path,
         f"AttributeBegin Translate 1 2 3 Rotate 90 0 1 0 Scale 2 1 1 {SPHERE}AttributeEnd\n"
         f"AttributeBegin Transform [2 0 0 0  0 1 0 0  0 0 1 0  5 6 7 1] {SPHERE}AttributeEnd\n"
+        f'TransformBegin Translate 9 9 9 Material "conductor" TransformEnd {SPHERE}\n'
         f'CoordSysTransform "camera" Translate 0 0 4 {SPHERE}',
+        CAMERA.replace("LookAt 0 0 9  0 0 0", "LookAt 1 2 9  1 2 0"),
     )
-    first, second, third = (one.world_bounds for one in scene.objects)
+    first, second, unmoved, seen = (one.world_bounds for one in scene.objects)
     np.testing.assert_allclose(first, [[0, 1, 1], [2, 3, 5]], atol=1e-2)
     np.testing.assert_allclose(second, [[3, 5, 6], [7, 7, 8]], atol=1e-2)
-    np.testing.assert_allclose(third.mean(axis=0), [0, 0, 5], atol=1e-6)
+    np.testing.assert_allclose(unmoved.mean(axis=0), [0, 0, 0], atol=1e-6)
+    # Of a transform's own attributes only the place ends with it.
+    assert [scene.materials[one.material].metallic for one in scene.objects] == [0, 0, 1, 1]
+    np.testing.assert_allclose(seen.mean(axis=0), [1, 2, 5], atol=1e-6)
 
 
 def test_objects_are_shared_by_their_instances(tmp_path: Path) -> None:
@@ -161,8 +166,14 @@ def test_files_are_included(tmp_path: Path) -> None:
 
 
 def test_attributes_hold_for_what_follows(tmp_path: Path) -> None:
-    scene, _ = read(tmp_path, f'Attribute "shape" "float radius" 2\n{SPHERE}Shape "sphere" "float radius" 3')
-    assert [round(float(one.world_bounds[1, 0])) for one in scene.objects] == [2, 3]
+    scene, report = read(
+        tmp_path,
+        f'Attribute "shape" "float radius" 2\n{SPHERE}Shape "sphere" "float radius" 3\n'
+        'Shape "trianglemesh" "point3 P" [0 0 0 1 0 0 0 1 0]',
+    )
+    assert [round(float(one.world_bounds[1, 0])) for one in scene.objects] == [2, 3, 1]
+    # A mesh has no radius.
+    assert report.is_whole
 
 
 # -------------------------------------------------------------------------------------------- shapes
