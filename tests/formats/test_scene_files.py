@@ -445,7 +445,9 @@ def test_files_that_are_no_scene(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is a folder"):
         registry.load(tmp_path)
     (tmp_path / "a.docx").write_text("hello")
-    with pytest.raises(InputError, match=r"use a scene \(\.toml, \.xml, \.pbrt\) or a mesh \(\.glb, .*\.ply, \.stl"):
+    with pytest.raises(
+        InputError, match=r"use a scene \(\.toml, \.xml, \.pbrt\) or a mesh \(\.glb, .*\.ply, \.stl"
+    ):
         registry.load(tmp_path / "a.docx")
     (tmp_path / "a.toml").write_bytes(b"version = 1\n\xff\xfe")
     with pytest.raises(InputError, match="line 2: is not UTF-8"):

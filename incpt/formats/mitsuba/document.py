@@ -31,6 +31,8 @@ MOST_FILES = 1000
 MOST_NODES = 1_000_000
 _LONGEST_TEXT = 1 << 20
 """Characters of an attribute: parameters that name others twice grow without bounds."""
+_LONGEST_NAME = 256
+"""Characters of a parameter's name."""
 _BEFORE_2 = (2, 0)
 _PARAMETER = re.compile(r"(?<!\\)\$(\w*)", re.ASCII)
 
@@ -98,15 +100,15 @@ class Document:
 
     def _parameter(self, word: str) -> str:
         """The value of the parameter with the longest name that a word begins with, and the rest of it."""
-        for end in range(len(word), 0, -1):
+        for end in range(min(len(word), _LONGEST_NAME), 0, -1):
             if word[:end] in self._parameters:
                 return self._parameters[word[:end]] + word[end:]
         raise InputError(f"the parameter ${word[:40]} has no value; give it one by <default>")
 
     def default(self, name: str, value: str) -> None:
         """The value of a parameter where it has none yet."""
-        if not name:
-            raise InputError("<default> needs a name")
+        if not 0 < len(name) <= _LONGEST_NAME:
+            raise InputError(f"<default> needs a name of at most {_LONGEST_NAME} characters")
         self._parameters.setdefault(name, value)
 
     def add(self, node: Node) -> None:

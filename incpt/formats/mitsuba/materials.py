@@ -41,6 +41,8 @@ from incpt.scene.texture import Bitmap, Texture
 _SAME_INDEX = 5e-3
 """Indices of refraction that differ by less are those of one substance."""
 _AIR_LIKE = 1.001
+_MOST_BODIES = 1000
+"""Pairs of indices of refraction, inside and outside, among which those are sought that hold others."""
 
 
 @dataclass
@@ -60,14 +62,16 @@ class Materials:
     document: Document
     textures: Textures
     _made: dict[int, Surface] = field(default_factory=dict)
-    _bodies: list[tuple[float, float]] = field(default_factory=list)
+    _bodies: dict[tuple[float, float], None] = field(default_factory=dict)
     _one_sided: set[int] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         for node in self.document.nodes:
             if node.tag == "bsdf" and node.kind in ("dielectric", "roughdielectric"):
                 with in_place(node.place):
-                    self._bodies.append((index(node, "int_ior", "bk7"), index(node, "ext_ior", "air")))
+                    body = index(node, "int_ior", "bk7"), index(node, "ext_ior", "air")
+                if len(self._bodies) < _MOST_BODIES:
+                    self._bodies[body] = None
 
     def of_shape(self, node: Node | None) -> Surface:
         """What a shape with that BSDF looks like. Raises InputError."""

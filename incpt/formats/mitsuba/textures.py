@@ -26,7 +26,7 @@ from incpt.formats.appearance.colored import (
 )
 from incpt.formats.mitsuba.document import Document
 from incpt.formats.mitsuba.node import Color, Node
-from incpt.formats.mitsuba.transforms import numbers
+from incpt.formats.mitsuba.transforms import number, numbers, words
 from incpt.formats.mitsuba.values import spectrum, spectrum_of_file
 from incpt.picture.spectra import Spectrum, blackbody_color, emitted_color, reflected_color
 from incpt.scene.texture import FILTERS, WRAPS, Bitmap, Texture
@@ -142,8 +142,7 @@ class Textures:
         value = node.value("value")
         if isinstance(value, Spectrum):
             return value
-        counts = range(2, 100_000)
-        values = numbers(node.text("values"), *counts)
+        values = [number(word) for word in words(node.text("values"))]
         if node.kind == "irregular":
             wavelengths = numbers(node.text("wavelengths"), len(values))
         else:

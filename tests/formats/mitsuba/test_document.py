@@ -143,6 +143,7 @@ def test_neither_parameters_nor_files_nor_objects_grow_without_bounds(tmp_path: 
     for body, message in (
         (f'<default name="p0x" value="xxxxxxxx"/>{doubled}', "longer than"),
         ("<a>" * 100 + "</a>" * 100, "within each other"),
+        (f'<default name="a" value="1"/><default name="b" value="${"x" * 300_000}"/>', "has no value"),
         (
             "".join(f'<bsdf type="mask" id="b{i}"><ref id="b{i + 1}"/></bsdf>' for i in range(100))
             + '<bsdf type="diffuse" id="b100"/><shape type="sphere"><ref id="b0"/></shape>',

@@ -97,6 +97,11 @@ def test_colours_of_light(tmp_path: Path) -> None:
     flat = radiance('<spectrum name="radiance" value="2"/>')
     np.testing.assert_allclose(flat, 2 * emitted_color((300, 900), (1, 1)))
     np.testing.assert_allclose(radiance('<spectrum name="radiance" value="300:2, 900:2"/>'), flat, rtol=1e-9)
+    listed = '<string name="values" value="2, 2"/><{0} name="wavelength{1}" value="{2}"/>'
+    regular = listed.format("float", "_min", 300) + '<float name="wavelength_max" value="900"/>'
+    for kind, content in (("irregular", listed.format("string", "s", "300, 900")), ("regular", regular)):
+        spectrum = f'<spectrum type="{kind}" name="radiance">{content}</spectrum>'
+        np.testing.assert_allclose(radiance(spectrum), flat, rtol=1e-9)
     black = '<spectrum type="blackbody" name="radiance"><float name="temperature" value="3000"/></spectrum>'
     np.testing.assert_allclose(radiance(black), blackbody_color(3000))
 

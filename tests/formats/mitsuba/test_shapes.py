@@ -256,7 +256,7 @@ def test_serialized_meshes(version: int, doubles: bool, tmp_path: Path) -> None:
 def test_damaged_serialized_meshes_are_left_out(tmp_path: Path) -> None:
     good = serialized(4)
     random = np.random.default_rng(1)
-    for _ in range(300):
+    for _ in range(150):
         damaged = bytearray(good)
         for place in random.integers(0, len(good), 3):
             damaged[place] = random.integers(0, 256)
