@@ -64,6 +64,7 @@ class Materials:
     _made: dict[int, Surface] = field(default_factory=dict)
     _bodies: dict[tuple[float, float], None] = field(default_factory=dict)
     _one_sided: set[int] = field(default_factory=set)
+    _microfacets: set[tuple[str, bool]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         for node in self.document.nodes:
@@ -88,6 +89,13 @@ class Materials:
                 self._made[id(node)] = self._read(node)
                 Material(**self._made[id(node)].look)
         return self._made[id(node)]
+
+    @property
+    def loses_no_light(self) -> bool:
+        """Whether microfacets that let no light get lost are nearer to those of the scene: Beckmann's lose
+        little within glass, where GGX's with the same alpha lose several percent."""
+        others = {("roughdielectric", True), ("roughconductor", True), ("roughconductor", False)}
+        return ("roughdielectric", False) in self._microfacets and not others & self._microfacets
 
     def tell_of_back_sides(self) -> None:
         """Of opaque BSDFs that have only one in Mitsuba."""
@@ -157,7 +165,9 @@ class Materials:
 
     def _tell_of_distribution(self, node: Node) -> None:
         node.ignore("sample_visible")
-        if node.text("distribution", "beckmann").lower() != "ggx":
+        is_ggx = node.text("distribution", "beckmann").lower() == "ggx"
+        self._microfacets.add((node.kind, is_ggx))
+        if not is_ggx:
             import_report.changed(f"{node}: the microfacets are GGX's with the same alpha, not Beckmann's")
 
     def plastic(self, node: Node) -> Surface:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -45,7 +46,8 @@ def read_mitsuba(path: Path) -> Scene:
     emitters.read(root)
     cameras, film = _cameras(root, _bounds(objects))
     active = next(iter(cameras))
-    settings = _settings(root, film, shapes.materials)
+    # Mitsuba's microfacets scatter light once.
+    settings = replace(_settings(root, film, shapes.materials), multiple_scattering=materials.loses_no_light)
     scene = Scene(
         cameras[active],
         emitters.environment or Environment(),
@@ -98,7 +100,7 @@ def _cameras(root: Node, bounds: Array) -> tuple[dict[str, Camera], Film | None]
 
 
 def _settings(root: Node, film: Film | None, materials: dict[str, Material]) -> RenderSettings:
-    """How the scene asks to be rendered. Mitsuba's microfacets scatter light once."""
+    """How far paths of the scene go, and how large its picture is."""
     depth, roulette = -1, 5
     waiting = list(root.objects_of("integrator"))
     while waiting:
@@ -126,7 +128,6 @@ def _settings(root: Node, film: Film | None, materials: dict[str, Material]) -> 
         max_bounces=bounces,
         transmission_bounces=MOST_BOUNCES,
         roulette_depth=min(roulette, 255),
-        multiple_scattering=False,
     )
 
 

@@ -148,6 +148,25 @@ def test_how_the_scene_is_rendered(tmp_path: Path) -> None:
     assert scene.settings.max_bounces == 2 and "aov integrator" in told(report)[0]
 
 
+def test_glass_of_beckmann_alone_loses_no_light(tmp_path: Path) -> None:
+    def scatters_on(*bsdfs: str) -> bool:
+        shapes = "".join(f'<shape type="sphere">{one}</shape>' for one in bsdfs)
+        return read(tmp_path, shapes)[0].settings.multiple_scattering
+
+    ggx = '<string name="distribution" value="ggx"/>'
+    glass, smooth_glass, metal = (f'<bsdf type="rough{kind}">{{}}</bsdf>' for kind in _ROUGH)
+    assert scatters_on(glass.format("")) and scatters_on(glass.format(""), smooth_glass.format(""))
+    for others in (
+        (glass.format(ggx),),
+        (glass.format(""), glass.format(ggx)),
+        (glass.format(""), metal.format("")),
+    ):
+        assert not scatters_on(*others)
+
+
+_ROUGH = ("dielectric", "plastic", "conductor")
+
+
 def test_filters_and_samples_are_told(tmp_path: Path) -> None:
     content = (
         number("fov", 50) + '<sampler type="independent"><integer name="sample_count" value="64"/></sampler>'
