@@ -21,8 +21,9 @@ DIGEST_CHARACTERS = 16
 _NOT_CONTENT = ("source", "settings")
 
 _MEASURED = (
-    "core", "picture", "scene", "formats", "formats.gltf", "formats.gltf_writer", "formats.obj",
-    "formats.ply", "formats.threemf", "device", "accel", "tables",
+    "core", "picture", "scene", "formats", "formats.appearance", "formats.gltf", "formats.gltf_writer",
+    "formats.mitsuba", "formats.obj", "formats.pbrt", "formats.ply", "formats.threemf",
+    "device", "accel", "tables",
     "render", "render.impact", "viewer",
 )  # fmt: skip
 """Packages of incpt that a result may depend on; what only puts things on the terminal is left out."""
