@@ -61,6 +61,8 @@ class App:
         self.shown_frame: Frame | None = None
         self._kept = kept
         files.offer_recovery(self.editor, self.recovery)
+        if self.editor.dialog is None and files.has_missing(self.editor):
+            files.find_missing(self.editor)
 
     def run(self) -> None:
         """The loop, until the window is closed."""

@@ -9,6 +9,7 @@ import typer
 
 from incpt.cli.console import complain
 from incpt.cli.options import (
+    MissingOption,
     OutsideOption,
     StrictOption,
     TimeOption,
@@ -23,6 +24,7 @@ def check(
     time: TimeOption = None,
     strict: StrictOption = False,
     allow_outside: OutsideOption = False,
+    allow_missing: MissingOption = False,
     up: UpOption = None,
     unit: UnitOption = None,
 ) -> None:
@@ -31,7 +33,7 @@ def check(
     from incpt.scene import summary
 
     scene, report = registry.load_with_report(
-        file, **import_options(up, unit, time=time, allow_outside=allow_outside)
+        file, **import_options(up, unit, time=time, allow_outside=allow_outside, allow_missing=allow_missing)
     )
     if strict:
         report.check_whole()

@@ -44,6 +44,12 @@ UnitOption = Annotated[
 OutsideOption = Annotated[
     bool, typer.Option("--allow-outside", help="Let files name others outside their own folders.")
 ]
+MissingOption = Annotated[
+    bool,
+    typer.Option(
+        "--allow-missing", help="Let cubes and single colours stand for meshes and images that are not there."
+    ),
+]
 
 
 def import_options(up: str | None, unit: str | None, **others: Any) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from incpt.cli.console import Stopped, complain, interruption, path_progress
 from incpt.cli.options import (
     BouncesOption,
     DeviceOption,
+    MissingOption,
     OutsideOption,
     SceneArgument,
     SeedOption,
@@ -90,6 +91,7 @@ def render(
     fps: Annotated[float, typer.Option(help="Frames per second of a sequence.", min=1e-3)] = 24.0,
     strict: StrictOption = False,
     allow_outside: OutsideOption = False,
+    allow_missing: MissingOption = False,
     up: UpOption = None,
     unit: UnitOption = None,
     device: DeviceOption = None,
@@ -103,7 +105,7 @@ def render(
         raise InputError(f"--aovs: {output} cannot hold them; use an .exr")
     if denoise:
         denoising.require_denoiser()
-    asked = import_options(up, unit, allow_outside=allow_outside)
+    asked = import_options(up, unit, allow_outside=allow_outside, allow_missing=allow_missing)
     shots = [(output, time)] if frames is None else _shots(output, frames, fps, time)
     session: Session | None = None
     for path, moment in shots:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import NoneType
 
 from incpt.core.checks import one_of, require_bool
@@ -27,6 +27,8 @@ class ImportOptions:
     up              the axis that is up in mesh files that do not say it, "y" or "z"; None: y
     unit            the metres of their unit; None: one
     materials       whether mesh files bring their materials; scenes of other renderers have their own
+    allow_missing   whether placeholders stand for meshes and images of a scene file that cannot be read; what
+                    is read is the same, so that files are not read again for it
     """
 
     time: float | None = None
@@ -34,11 +36,12 @@ class ImportOptions:
     up: str | None = None
     unit: float | None = None
     materials: bool = True
+    allow_missing: bool = field(default=False, compare=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.time, NoneType):
             set_number(self, "time", 0.0, LARGEST)
-        for name in ("allow_outside", "materials"):
+        for name in ("allow_outside", "materials", "allow_missing"):
             require_bool(name, getattr(self, name))
         if self.up is not None:
             one_of("up", self.up, UP_AXES)

@@ -110,15 +110,19 @@ def load(
     allow_outside: bool = False,
     up: str | None = None,
     unit: float | None = None,
+    allow_missing: bool = False,
 ) -> Scene:
     """A scene from a scene file (.toml, .xml of Mitsuba, .pbrt), or a default scene around a mesh file.
 
     `time`: seconds into the animations of its files; None leaves them out. `allow_outside`: a glTF file may
     name files outside its own folder. `up` ("y" or "z") and `unit` (metres) say how a mesh file is meant
-    whose format does not say it (OBJ, PLY, STL ...). InputWarnings tell of all that was left out, and of a
-    scene that shows nothing. Raises InputError, one line that names file, table and key.
+    whose format does not say it (OBJ, PLY, STL ...). `allow_missing`: cubes and single colours stand for
+    meshes and images of a scene file that cannot be read. InputWarnings tell of all that was left out, and
+    of a scene that shows nothing. Raises InputError, one line that names file, table and key.
     """
-    scene, report = load_with_report(path, time=time, allow_outside=allow_outside, up=up, unit=unit)
+    scene, report = load_with_report(
+        path, time=time, allow_outside=allow_outside, up=up, unit=unit, allow_missing=allow_missing
+    )
     for complaint in complaints(path, scene, report):
         warnings.warn(complaint, InputWarning, stacklevel=2)
     return scene
@@ -138,10 +142,11 @@ def load_with_report(
     allow_outside: bool = False,
     up: str | None = None,
     unit: float | None = None,
+    allow_missing: bool = False,
 ) -> tuple[Scene, ImportReport]:
     """A scene as `load` gives it, and what became of its files: nothing is warned of. Raises InputError."""
     path = path_of("path", path)
-    options = ImportOptions(time, allow_outside, up, unit)
+    options = ImportOptions(time, allow_outside, up, unit, allow_missing)
     check_readable(path)
     row = format_of(path, FileKind.SCENE, FileKind.MESH)
     if row is None:

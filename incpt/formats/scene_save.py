@@ -89,7 +89,8 @@ class Beside:
 
     def _mesh(self, mesh: Mesh, name: str) -> dict[str, str]:
         source = mesh.source
-        if source.file is not None and _same_mesh(mesh, self._mesh_on_disk(source)):
+        # A placeholder is named as what it stands for.
+        if source.file is not None and (mesh.is_placeholder or _same_mesh(mesh, self._mesh_on_disk(source))):
             choice = {"part": source.part, "geometry": source.geometry}
             chosen = {key: name for key, name in choice.items() if name is not None}
             return {"mesh": self._relative(source.file), **chosen}
@@ -117,7 +118,7 @@ class Beside:
 
     def image(self, image: Image) -> str:
         """The name of an image's file."""
-        if image.source is not None and is_stored_image(image):
+        if image.source is not None and (image.is_placeholder or is_stored_image(image)):
             return self._relative(image.source)
         path = self.folder / f"{self._stem}.environment.{images.digest(image.pixels)}.exr"
         if not path.exists():
@@ -133,7 +134,7 @@ class Beside:
 
     def _bitmap(self, bitmap: Bitmap) -> dict[str, Any]:
         source = bitmap.source
-        if source.file is not None and is_stored_bitmap(bitmap):
+        if source.file is not None and (bitmap.is_placeholder or is_stored_bitmap(bitmap)):
             number = {} if source.index is None else {"image": source.index}
             return {"file": self._relative(source.file), **number}
         digest, suffix = bitmaps.digest(bitmap), bitmaps.suffix_of(bitmap)

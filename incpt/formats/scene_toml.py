@@ -7,6 +7,7 @@ alone: their field names are the keys, their own checks the ranges.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Mapping
 from dataclasses import fields
 from difflib import get_close_matches
@@ -15,7 +16,7 @@ from typing import Any, TypeVar
 
 from incpt.core.errors import InputError, in_place
 from incpt.core.settings import RenderSettings
-from incpt.formats import images, textures
+from incpt.formats import images, placeholders, textures
 from incpt.formats.mesh_library import MeshLibrary
 from incpt.formats.toml_kit import check_keys, quoted, read_toml, table_of, text_of
 from incpt.scene.camera import Camera
@@ -119,7 +120,11 @@ def _environment(table: dict[str, Any], folder: Path) -> Environment:
     if "image" in values:
         with in_place("image"):
             name = text_of({"image": values["image"]}, "image", "name an OpenEXR file")
-            values["image"] = images.load_image(folder / name)
+            values["image"] = placeholders.read_or(
+                lambda: images.load_image(folder / name),
+                lambda: placeholders.image(os.path.abspath(folder / name)),
+                "an even grey",
+            )
         values.setdefault("color", (1.0, 1.0, 1.0))
     if "sky" in values:
         values["sky"] = sky_of(values["sky"])

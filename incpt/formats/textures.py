@@ -8,6 +8,7 @@ A texture is the name of an image file, or a table with `file` and how the image
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -15,10 +16,10 @@ from typing import Any
 
 from incpt.core.errors import InputError, in_place
 from incpt.core.layout import TextureSlot
-from incpt.formats import bitmaps
+from incpt.formats import bitmaps, placeholders
 from incpt.formats.toml_kit import check_keys, text_of
 from incpt.scene.material import texture_name
-from incpt.scene.texture import Bitmap, Texture
+from incpt.scene.texture import Bitmap, BitmapSource, Texture
 
 NAMES = tuple(texture_name(slot) for slot in TextureSlot)
 """Parameters of materials that are textures."""
@@ -30,14 +31,15 @@ def with_textures(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """The values of a material's table, with textures in place of what names their files, relative to
     `folder`. `""` or `false` takes a texture away. Raises InputError."""
     found = dict(values)
-    for name in NAMES:
+    for slot in TextureSlot:
+        name = texture_name(slot)
         if name in found:
             with in_place(name):
-                found[name] = _texture(found[name], folder)
+                found[name] = _texture(found[name], folder, slot)
     return found
 
 
-def _texture(value: Any, folder: Path) -> Texture | None:
+def _texture(value: Any, folder: Path, slot: TextureSlot) -> Texture | None:
     if value == "" or value is False:
         return None
     table = {"file": value} if isinstance(value, str) else value
@@ -48,7 +50,12 @@ def _texture(value: Any, folder: Path) -> Texture | None:
     index = table.get("image")
     if index is not None and (isinstance(index, bool) or not isinstance(index, int) or index < 0):
         raise InputError(f"image: {index!r} is not the number of an image of the file; count from 0")
-    bitmap = bitmaps.load_bitmap(folder / file, index)
+    source = BitmapSource(os.path.abspath(folder / file), index)
+    bitmap = placeholders.read_or(
+        lambda: bitmaps.load_bitmap(folder / file, index),
+        lambda: placeholders.bitmap(source, slot),
+        "one colour",
+    )
     return Texture(bitmap, **{name: table[name] for name in _OPTIONS if name in table})
 
 

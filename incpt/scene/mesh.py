@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core.arrays import frozen, numbers
-from incpt.core.checks import require
+from incpt.core.checks import require, require_bool
 from incpt.core.errors import InputError
 from incpt.scene.checks import LARGEST, is_list
 from incpt.scene.texture import UV_SETS
@@ -45,6 +45,7 @@ class Mesh:
               multiplied with, or None
     tangents  (F, 3, 4) float32 unit tangents, along which u grows, and the side on which v does (1: that of
               normal x tangent; -1), or None: they are computed where normal maps need them (`tangents.py`)
+    is_placeholder  whether it stands for what `source` names, which could not be read
 
     Compared by identity: objects that share one Mesh share its BVH.
     """
@@ -56,11 +57,13 @@ class Mesh:
     uvs: tuple[npt.NDArray[np.float32], ...] = ()
     colors: npt.NDArray[np.float32] | None = None
     tangents: npt.NDArray[np.float32] | None = None
+    is_placeholder: bool = False
 
     def __post_init__(self) -> None:
         vertices = frozen(numbers("vertices", self.vertices, np.float32))
         faces = frozen(numbers("faces", self.faces, np.int32))
         require("source", self.source, MeshSource, "a MeshSource")
+        require_bool("is_placeholder", self.is_placeholder)
         if vertices.ndim != 2 or vertices.shape[1] != 3:
             raise InputError(f"vertices: have shape {vertices.shape}; a mesh has shape (V, 3)")
         if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core.arrays import frozen
-from incpt.core.checks import described, one_of, pair, require, whole
+from incpt.core.checks import described, one_of, pair, require, require_bool, whole
 from incpt.core.errors import InputError
 from incpt.scene.checks import LARGEST, set_number
 
@@ -46,14 +46,17 @@ class Bitmap:
 
     uint8 and uint16 stand for 0 to 1, as files have them: what they mean, colours in sRGB or plain numbers,
     is said by what a material uses them for. float32 (float16 too) is linear always. Compared by identity: a
-    bitmap is on a device once, however many textures use it.
+    bitmap is on a device once, however many textures use it. `is_placeholder` tells that it stands for what
+    `source` names and could not be read.
     """
 
     pixels: npt.NDArray[Any]
     source: BitmapSource = BitmapSource()
+    is_placeholder: bool = False
 
     def __post_init__(self) -> None:
         require("source", self.source, BitmapSource, "a BitmapSource")
+        require_bool("is_placeholder", self.is_placeholder)
         try:
             pixels = np.asarray(self.pixels)
         except ValueError:  # rows of unequal length

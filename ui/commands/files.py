@@ -9,17 +9,19 @@ from pathlib import Path
 from typing import Any
 
 from incpt.core.layout import TextureSlot
-from incpt.formats import bitmaps, insert, registry
+from incpt.formats import bitmaps, insert, registry, relink
 from incpt.formats.bitmaps import load_bitmap
 from incpt.formats.gltf_writer.export import export
 from incpt.formats.pack import pack
 from incpt.formats.registry import FileKind
+from incpt.formats.relink import MissingFile
 from incpt.scene.material import texture_name
 from incpt.scene.selection import Selection
 from incpt.scene.texture import Texture
 from incpt.ui.dialogs.native import FileFilter
 from incpt.ui.dialogs.path_dialog import PathDialog
 from incpt.ui.dialogs.question import Choice, Question
+from incpt.ui.dialogs.relink_dialog import RelinkDialog
 from incpt.ui.editor.dialog import Answer
 from incpt.ui.editor.document import SUFFIX, Document, collected_warnings
 from incpt.ui.editor.editor import Editor
@@ -43,7 +45,7 @@ TEXTURES = FileFilter("Images", bitmaps.SUFFIXES)
 
 def new(editor: Editor) -> None:
     """A new scene, once unsaved changes are cared for."""
-    _when_saved(editor, lambda: editor.start_over(Document.new()))
+    _when_saved(editor, lambda: start_over(editor, Document.new()))
 
 
 def open_(editor: Editor) -> None:
@@ -172,7 +174,7 @@ def offer_recovery(editor: Editor, kept: Recovery) -> None:
         "Recover",
         f"The editor ended without saving {found.name}. Open what it had on {found.saved_at}?",
         (
-            Choice("Recover", Answer(lambda: editor.start_over(kept.recover(found)))),
+            Choice("Recover", Answer(lambda: start_over(editor, kept.recover(found)))),
             Choice("Discard", Answer(found.remove)),
             Choice("Later", Answer()),
         ),
@@ -197,8 +199,50 @@ def stem(editor: Editor) -> str:
     return editor.document.name.removesuffix(".toml")
 
 
+def start_over(editor: Editor, document: Document, opened: Path | None = None) -> None:
+    """Edit another document from now on; where files of it are missing, ask for them."""
+    editor.start_over(document, opened)
+    if has_missing(editor):
+        find_missing(editor)
+
+
+def has_missing(editor: Editor) -> bool:
+    """Whether files of the scene could not be read."""
+    return bool(relink.missing_files(editor.scene))
+
+
+def find_missing(editor: Editor) -> None:
+    """Show the files of the scene that could not be read, and ask for others in their place."""
+    missing = relink.missing_files(editor.scene)
+    editor.dialog = RelinkDialog(missing, lambda one: _path_of_missing(editor, one))
+
+
+def use_in_place(editor: Editor, missing: MissingFile, path: Path) -> None:
+    """Use a file in place of one that is missing, and what is found beside it in place of others; what is
+    still missing is asked for again."""
+    before = len(relink.missing_files(editor.scene))
+    with collected_warnings() as warnings:
+        scene = relink.relinked(editor.scene, missing.path, path)
+    for warning in warnings:
+        editor.say(warning, "warning")
+    editor.propose(scene, f"Find {missing.path.name}")
+    left = len(relink.missing_files(editor.scene))
+    found = "1 file is" if before - left == 1 else f"{before - left} files are"
+    editor.say(f"{found} found, {left} missing" if left else f"{found} found, none is missing", "done")
+    if left:
+        find_missing(editor)
+
+
+def _path_of_missing(editor: Editor, missing: MissingFile) -> PathDialog:
+    kind = {"mesh": MESH_FILES, "texture": TEXTURES, "environment": ENVIRONMENTS}[missing.kind]
+    folder = next((one for one in missing.path.parents if one.is_dir()), Path.cwd())
+    return PathDialog(
+        f"Find {missing.path.name}", kind, False, folder, lambda path: use_in_place(editor, missing, path)
+    )
+
+
 def _open_now(editor: Editor, path: Path) -> None:
-    editor.start_over(Document.open(path), opened=path)
+    start_over(editor, Document.open(path), opened=path)
 
 
 def _when_saved(editor: Editor, then: Callable[[], None]) -> None:

@@ -129,6 +129,8 @@ COMMANDS: tuple[Command, ...] = (
     Command("Save", "File", files.save, "Ctrl+S", group=1, help="Write the scene file"),
     Command("Save as…", "File", files.save_as, "Ctrl+Shift+S", group=1, help="Write another scene file"),
     Command("Import mesh…", "File", files.import_mesh, group=2, help="Add a mesh file to the scene"),
+    Command("Find missing files…", "File", files.find_missing, group=2, enabled=files.has_missing,
+            help="Choose others in place of meshes and images that cannot be read"),
     Command("Export glTF…", "File", files.export_gltf, group=2, help="Write the scene for other programs"),
     Command("Pack…", "File", files.pack_archive, group=2,
             help="Write the scene with its meshes and images into an archive, to hand it over"),

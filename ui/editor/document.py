@@ -69,9 +69,10 @@ class Document:
     @classmethod
     def open(cls, path: str | os.PathLike[str], **options: Any) -> Document:
         """A document from a scene file, or an untitled one of a file that is not saved to: a mesh, or a scene
-        of another renderer. `options` are those of `registry.load_with_report`. Raises InputError."""
+        of another renderer. `options` are those of `registry.load_with_report`; placeholders stand for meshes
+        and images of a scene file that cannot be read. Raises InputError."""
         absolute = absolute_path(path)
-        scene, report = registry.load_with_report(absolute, **options)
+        scene, report = registry.load_with_report(absolute, allow_missing=True, **options)
         warnings = tuple(map(one_line, registry.complaints(absolute, scene, report)))
         is_scene = absolute.suffix.lower() == SUFFIX
         name = absolute.name if is_scene else absolute.stem

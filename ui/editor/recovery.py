@@ -53,10 +53,10 @@ class LeftBehind:
         return datetime.fromtimestamp(self.time).strftime("%Y-%m-%d %H:%M")
 
     def open(self) -> Document:
-        """The document as it was, unsaved, to be saved where it came from. The file stays. Raises
-        InputError."""
+        """The document as it was, unsaved, to be saved where it came from, with placeholders for files that
+        are gone since. The file stays. Raises InputError."""
         with collected_warnings() as messages:
-            scene = registry.load(self.path)
+            scene = registry.load(self.path, allow_missing=True)
         return Document(scene, self.original, name=self.name, warnings=tuple(messages), is_saved=False)
 
     def remove(self) -> None:

@@ -46,6 +46,8 @@ def draw(environment: Environment, refusals: Refusals) -> tuple[Environment, Ima
     environment = refusals.changed(environment, rotation_y=angle)
     image = environment.image
     name = "none" if image is None else Path(image.source or "made in Python").name
+    if image is not None and image.is_placeholder:
+        name += ", missing"
     widgets.value_row("Image", name, "Lat-long OpenEXR")
     with widgets.row(""):
         is_choose = widgets.button("Choose…##image")

@@ -118,7 +118,8 @@ def _described(texture: Texture) -> str:
     source = bitmap.source
     name = "made in Python" if source.file is None else Path(source.file).name
     part = "" if source.index is None else f" {source.index}"
-    return f"{name}{part}, {bitmap.width} × {bitmap.height}"
+    size = "missing" if bitmap.is_placeholder else f"{bitmap.width} × {bitmap.height}"
+    return f"{name}{part}, {size}"
 
 
 def _draw_bump_height(material: Material, refusals: Refusals) -> Material:

@@ -111,15 +111,16 @@ NEEDS_SELECTION = {
 }  # fmt: skip
 NEEDS_PICTURE = {"Export picture…", "Copy picture", "Pin reference"}
 NEEDS_CAMERAS = {"Next camera"}
+NEEDS_LOSS = "Find missing files…"
 
 
 def test_what_is_disabled(user: Desk) -> None:
     disabled = {one.name for one in COMMANDS if not one.is_enabled(user.editor)}
-    assert disabled == NEEDS_SELECTION | NEEDS_PICTURE | NEEDS_CAMERAS | {"Undo", "Redo", "Paste"}
+    assert disabled == NEEDS_SELECTION | NEEDS_PICTURE | NEEDS_CAMERAS | {"Undo", "Redo", "Paste", NEEDS_LOSS}
     user.editor.select(Selection(("lamp",)))
     user.run("Delete")
     disabled = {one.name for one in COMMANDS if not one.is_enabled(user.editor)}
-    assert disabled == NEEDS_SELECTION | NEEDS_PICTURE | NEEDS_CAMERAS | {"Redo", "Paste"}
+    assert disabled == NEEDS_SELECTION | NEEDS_PICTURE | NEEDS_CAMERAS | {"Redo", "Paste", NEEDS_LOSS}
 
 
 def test_keys_are_shown_as_they_are_printed() -> None:

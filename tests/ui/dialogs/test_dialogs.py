@@ -20,12 +20,14 @@ from incpt.core.layout import TextureSlot
 from incpt.formats import bitmaps, registry, scene_save
 from incpt.scene.selection import Selection
 from incpt.ui.commands import files, pictures
+from incpt.ui.commands.table import command
 from incpt.ui.dialogs import native
 from incpt.ui.dialogs.path_dialog import PathDialog
 from incpt.ui.dialogs.question import Question
+from incpt.ui.dialogs.relink_dialog import RelinkDialog
 from incpt.ui.editor import clipboard
-from incpt.ui.editor.document import new_scene
-from incpt.ui.editor.recovery import Recovery
+from incpt.ui.editor.document import Document, new_scene
+from incpt.ui.editor.recovery import LeftBehind, Recovery
 from incpt.ui.panels import textures
 from incpt.viewer.renderer import Export
 
@@ -566,3 +568,59 @@ def test_the_picture_takes_no_click_while_the_systems_dialog_is_open(
     user.frames(100)
     user.click_at(*user.at_picture(0.5, 0.5))
     assert user.editor.dialog is None and len(user.null.requests) == 1
+
+
+# ------------------------------------------------------------------------------------------- missing files
+
+
+@pytest.fixture
+def torn(tmp_path: Path) -> Path:
+    """A scene file whose two images lie elsewhere."""
+    (tmp_path / "elsewhere").mkdir()
+    for name in ("wood", "tiles"):
+        bitmaps.write_bitmap(tmp_path / "elsewhere" / f"{name}.png", A_TEXTURE.bitmap)
+    path = tmp_path / "torn.toml"
+    path.write_text(
+        'version = 2\n[materials.wood]\nbase_color_texture = "wood.png"\n[materials.tiles]\n'
+        'base_color_texture = "tiles.png"\n[[objects]]\nname = "pot"\nmesh = "pot.glb"\nmaterial = "wood"\n'
+    )
+    return path
+
+
+def test_files_that_are_missing_are_asked_for_and_found_together(user: Desk, torn: Path) -> None:
+    user.key("Ctrl+O")
+    answer(user, str(torn))
+    assert isinstance(user.editor.dialog, RelinkDialog) and not user.editor.document.is_dirty
+    assert [one.path.name for one in user.editor.dialog.missing] == ["pot.glb", "wood.png", "tiles.png"]
+    choose(user, "Choose…##tiles.png")
+    assert isinstance(user.editor.dialog, PathDialog)
+    answer(user, str(torn.parent / "elsewhere" / "nothing.png"))
+    assert isinstance(user.editor.dialog, PathDialog) and "no such file" in user.texts()[-1]
+    answer(user, str(torn.parent / "elsewhere" / "tiles.png"))
+    assert user.texts()[-1] == "2 files are found, 1 missing" and user.undo_count == 1
+    assert isinstance(user.editor.dialog, RelinkDialog)
+    assert [one.path.name for one in user.editor.dialog.missing] == ["pot.glb"]
+    choose(user, "Close")
+    assert user.editor.dialog is None
+    user.run("Find missing files…")
+    assert isinstance(user.editor.dialog, RelinkDialog)
+    user.key("Escape")
+    user.editor.attempt(lambda: files.save(user.editor))
+    saved = torn.read_text()
+    assert '"elsewhere/wood.png"' in saved and '"pot.glb"' in saved
+
+
+def test_a_whole_scene_asks_for_no_files(user: Desk, other: Path) -> None:
+    files.open_file(user.editor, other)
+    assert user.editor.dialog is None
+    assert not command("Find missing files…").is_enabled(user.editor)
+
+
+def test_what_a_crash_left_is_opened_though_a_file_is_gone(user: Desk, torn: Path, tmp_path: Path) -> None:
+    document = Document.open(torn)
+    crashed = Recovery(1.0, tmp_path / "kept")
+    crashed.write(document.scene, torn)
+    left = LeftBehind(crashed.path or tmp_path, torn, 0.0)
+    files.start_over(user.editor, Recovery(1.0, tmp_path / "kept").recover(left))
+    assert isinstance(user.editor.dialog, RelinkDialog) and len(user.editor.dialog.missing) == 3
+    assert user.editor.document.path == torn and user.editor.document.is_dirty
