@@ -22,6 +22,7 @@ from incpt.ui.panels import material as material_panel
 from incpt.ui.panels import name as name_panel
 from incpt.ui.panels import notices, outliner, plots, render, tool, transform
 from incpt.ui.panels import textures as textures_panel
+from incpt.ui.panels.outliner import OutlinerState
 from incpt.ui.rect import Rect
 from incpt.ui.widgets import focus, places, widgets
 from incpt.ui.widgets.refusals import Refusals
@@ -32,7 +33,7 @@ class Workspace:
 
     def __init__(self) -> None:
         self.records = Records()
-        self._search = ""
+        self._outliner = OutlinerState()
         self._is_uniform = True
         self._devices: list[str] | None = None
         self._layout = Layout()
@@ -50,6 +51,8 @@ class Workspace:
         notices.draw_status_bar(editor.gesture.hint or status)
         area = self._layout.dock(editor.screen.wants_first_layout)
         editor.screen = replace(editor.screen, wants_first_layout=False)
+        if editor.screen.is_renaming:
+            imgui.set_window_focus("Outliner")
         self._window("Outliner", editor, self._draw_outliner)
         self._window("Object", editor, self._draw_object)
         self._window("Scene", editor, self._draw_scene)
@@ -71,15 +74,20 @@ class Workspace:
     # ---------------------------------------------------------------------------------- one panel each
 
     def _draw_outliner(self, editor: Editor) -> None:
-        outcome, self._search = outliner.draw(editor.scene, editor.selection, self._search)
+        active = editor.selection.active
+        if editor.screen.is_renaming and active is not None:
+            self._outliner = self._outliner.begun_renaming(active)
+        editor.screen = replace(editor.screen, is_renaming=False)
+        outcome, self._outliner = outliner.draw(editor.scene, editor.selection, self._outliner)
         if outcome.selection != editor.selection:
             editor.select(outcome.selection)
         if outcome.switched is not None:
             is_shown = editor.scene.placed(outcome.switched).visible
             scene = edits.set_visible(editor.scene, (outcome.switched,), not is_shown)
             editor.propose(scene, "Hide" if is_shown else "Show")
-        if outcome.renaming is not None:
-            objects.rename(editor)
+        if outcome.renamed is not None:
+            old, new = outcome.renamed
+            editor.attempt(lambda: objects.rename_to(editor, old, new))
 
     def _draw_object(self, editor: Editor) -> None:
         name = editor.selection.active

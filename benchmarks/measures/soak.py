@@ -131,12 +131,13 @@ class Soak:
         """Select a random object of the outliner's first rows; None where there is none."""
         from incpt.ui.widgets import places
 
+        # The outliner scrolls to what was selected last, which may be known only now.
+        self.hand.show_tab("Object")
         names = [o.name for o in self.model.scene.objects if places.find(f"object {o.name}") is not None]
         if not names:
             return None
         name = self.random.choice(names)
         self.say(name)
-        self.hand.show_tab("Object")
         self.hand.click(f"object {name}")
         if self.hand.app.editor.selection.names != (name,):
             raise SoakError(f"a click in the outliner selects {self.hand.app.editor.selection.names}")
@@ -298,6 +299,7 @@ def _pick(soak: Soak) -> None:
 
     button = soak.random.choice((1, 3))
     soak.hand.click(soak.hand.in_picture(soak.random.random() * 0.99, soak.random.random() * 0.99), button)
+    soak.hand.pump(frames=12)  # until the renderer has said what is there
     soak.take_over(lambda old, new: old == new)
     if button == 3:
         # On what is selected it opens a menu, once the renderer has said what is there.

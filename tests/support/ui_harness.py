@@ -175,6 +175,12 @@ class Desk:
         imgui.get_io().add_mouse_wheel_event(0.0, turns)
         self.frame()
 
+    def wheel_at(self, name: str, turns: float) -> None:
+        """Turn the wheel over a widget."""
+        self.move(*self.place(name))
+        self.wheel(turns)
+        self.frames(2)
+
     # ------------------------------------------------------------------------------------------ keys
 
     def key(self, keys: str) -> None:

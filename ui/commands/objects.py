@@ -7,7 +7,6 @@ from dataclasses import replace
 from incpt.scene import edits
 from incpt.scene.selection import Selection
 from incpt.scene.transform import IDENTITY
-from incpt.ui.dialogs.text_field import TextField
 from incpt.ui.editor.editor import Editor
 from incpt.ui.editor.state import TRANSFORM_KEY
 
@@ -71,10 +70,8 @@ def delete(editor: Editor) -> None:
 
 
 def rename(editor: Editor) -> None:
-    """Ask for another name of the active object."""
-    old = editor.selection.active
-    if old is not None:
-        editor.dialog = TextField("Rename", "Name", old, lambda new_name: rename_to(editor, old, new_name))
+    """Have another name of the active object typed, in its row of the outliner."""
+    editor.screen = replace(editor.screen, is_renaming=True)
 
 
 def rename_to(editor: Editor, old: str, new_name: str) -> None:

@@ -105,6 +105,7 @@ class Screen:
     is_closing           the window is to close.
     wants_first_layout   the panels are to stand again as at the first start.
     wanted_menu          the menu that is to open at the mouse, by name; empty: none.
+    is_renaming          the name of the active one is to be typed in the outliner.
     menu_point           where in the picture a menu was asked for, until it is known what is there.
     """
 
@@ -112,4 +113,5 @@ class Screen:
     is_closing: bool = False
     wants_first_layout: bool = False
     wanted_menu: str = ""
+    is_renaming: bool = False
     menu_point: tuple[float, float] | None = None

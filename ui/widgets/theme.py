@@ -7,6 +7,8 @@ from pathlib import Path
 import imgui_bundle
 from imgui_bundle import ImVec4, imgui
 
+from incpt.ui.widgets import icons
+
 FONT_SIZE = 15.0
 """Height of text at 100 % scale, in points of the screen."""
 
@@ -77,9 +79,13 @@ _COLORS: dict[str, Rgba] = {
 
 
 def load_font() -> None:
-    """Put the text font into imgui's atlas. The file comes with imgui-bundle."""
-    folder = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "Roboto"
-    imgui.get_io().fonts.add_font_from_file_ttf(str(folder / "Roboto-Regular.ttf"), FONT_SIZE)
+    """Put the text font into imgui's atlas, and the icons with it. The files come with imgui-bundle."""
+    folder = Path(imgui_bundle.__file__).parent / "assets" / "fonts"
+    fonts = imgui.get_io().fonts
+    fonts.add_font_from_file_ttf(str(folder / "Roboto" / "Roboto-Regular.ttf"), FONT_SIZE)
+    merged = imgui.ImFontConfig()
+    merged.merge_mode = True
+    fonts.add_font_from_file_ttf(str(folder / icons.FILE), FONT_SIZE, merged)
 
 
 def apply(scale: float) -> None:

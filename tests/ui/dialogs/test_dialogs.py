@@ -19,7 +19,7 @@ from incpt.core.errors import OutputError
 from incpt.core.layout import TextureSlot
 from incpt.formats import bitmaps, registry, scene_save
 from incpt.scene.selection import Selection
-from incpt.ui.commands import files, pictures
+from incpt.ui.commands import camera, files, pictures
 from incpt.ui.commands.table import command
 from incpt.ui.dialogs import native
 from incpt.ui.dialogs.path_dialog import PathDialog
@@ -226,7 +226,7 @@ def test_a_file_is_replaced_only_when_told_so(user: Desk, other: Path) -> None:
 def test_where_replacing_fails_the_place_is_asked_for_again(
     user: Desk, other: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(*_: object) -> None:
+    def fail(*_: object, **__: object) -> None:
         raise OutputError("the disk is full")
 
     monkeypatch.setattr(scene_save, "save", fail)
@@ -348,7 +348,7 @@ def test_what_cannot_be_saved_is_not_left(
     files.save_to(user.editor, tmp_path / "mine.toml")
     edit(user)
 
-    def fail(*_: object) -> None:
+    def fail(*_: object, **__: object) -> None:
         raise OutputError("the disk is full")
 
     monkeypatch.setattr(scene_save, "save", fail)
@@ -478,12 +478,12 @@ def test_a_clipboard_that_fails_is_a_message(user: Desk, monkeypatch: pytest.Mon
 
 
 def test_a_name_is_asked_for_until_it_is_good(user: Desk) -> None:
-    user.editor.select(Selection(("lamp",)))
-    user.key("F2")
-    answer(user, "red cube")
-    assert user.editor.dialog is not None and user.scene is SCENE
-    answer(user, "panel")
-    assert user.editor.dialog is None and user.editor.selection.names == ("panel",) and user.undo_count == 1
+    user.run("New camera")
+    camera.rename_camera(user.editor)
+    answer(user, "camera")
+    assert user.editor.dialog is not None and user.scene.camera_name == "camera.001"
+    answer(user, "top")
+    assert user.editor.dialog is None and user.scene.camera_name == "top" and user.undo_count == 2
 
 
 @pytest.fixture
