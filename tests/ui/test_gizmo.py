@@ -8,12 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.cameras import cameras
 
+from incpt.core.affine import Vector
 from incpt.scene import edits
 from incpt.scene.camera import Camera
 from incpt.scene.material import Material
 from incpt.scene.model import Object, Scene
 from incpt.scene.shapes import shape
 from incpt.ui.display.projection import clip_from_world
+from incpt.ui.editor.state import Tool
 from incpt.ui.rect import Rect
 from incpt.ui.viewport import gizmo
 
@@ -29,13 +31,22 @@ SCENE = Scene(
 
 def test_handles_stand_at_the_matrix_of_an_object() -> None:
     np.testing.assert_array_equal(
-        gizmo.pivot(SCENE, ("cube",), "local")[:3], SCENE.objects[0].world_from_object
+        gizmo.handles(SCENE, ("cube",), Tool(space="local"))[:3], SCENE.objects[0].world_from_object
     )
+
+
+@pytest.mark.parametrize(
+    ("pivot", "place"), [("median", (0.5, 2.0, 4.0)), ("active", (1, 2, 3)), ("individual", (0.5, 2.0, 4.0))]
+)
+def test_handles_of_several_stand_at_the_pivot(pivot: str, place: Vector) -> None:
+    scene = edits.add_shape(SCENE, "cube", (0.0, 1.5, 5.0))[0]
+    matrix = gizmo.handles(scene, ("cube.001", "cube"), Tool(pivot=pivot))
+    assert tuple(matrix[:3, 3]) == place
 
 
 def test_handles_of_a_sheared_object_are_at_right_angles_and_keep_its_shear() -> None:
     """ImGuizmo makes the axes of its matrix orthogonal: it must be given none that are not."""
-    start = gizmo.pivot(SCENE, ("odd",), "local")
+    start = gizmo.handles(SCENE, ("odd",), Tool(space="local"))
     products = start[:3, :3].T @ start[:3, :3]
     np.testing.assert_allclose(products, np.diag(np.diag(products)), atol=1e-12)
     assert tuple(start[:3, 3]) == SCENE.object("odd").position

@@ -19,6 +19,7 @@ from incpt.ui.dialogs.about import About
 from incpt.ui.dialogs.help_page import HelpPage
 from incpt.ui.editor.editor import Editor
 from incpt.ui.panels.display import OVERLAY_TEXTS
+from incpt.ui.panels.tool import PIVOTS
 
 MENUS = ("File", "Edit", "Object", "View", "Render", "Help")
 """The menus of the bar, from left to right."""
@@ -101,6 +102,17 @@ def _clear(part: str) -> Action:
     return lambda editor: objects.clear(editor, part)
 
 
+def _turn_about(pivot: str) -> Action:
+    def use(editor: Editor) -> None:
+        editor.tool = replace(editor.tool, pivot=pivot)
+
+    return use
+
+
+def _turns_about(pivot: str) -> Test:
+    return lambda editor: editor.tool.pivot == pivot
+
+
 def _switch_space(editor: Editor) -> None:
     editor.tool = replace(editor.tool, space="local" if editor.tool.space == "world" else "world")
 
@@ -165,6 +177,9 @@ COMMANDS: tuple[Command, ...] = (
     Command("Local axes", "Edit", _switch_space, "Comma", plain_keys="L", group=4,
             checked=lambda e: e.tool.space == "local",
             help="The handles move and rotate about the object's own axes"),
+    *(Command(text, "Edit/Pivot", _turn_about(pivot), checked=_turns_about(pivot), group=4,
+              help="Several are turned and scaled about it")
+      for pivot, text in PIVOTS),
     Command("Snap", "Edit", _switch_snap, "Shift+Tab", plain_keys="X", group=4,
             checked=lambda e: e.preferences.snap.enabled, help="Move, rotate and scale in steps"),
     Command("Add…", "Object", lambda e: e.open_menu("add"), "Shift+A",

@@ -10,10 +10,17 @@ from incpt.viewer.view import Frame
 
 @dataclass(frozen=True)
 class Tool:
-    """The gizmo: `operation` is move, rotate or scale; `space` is world or local."""
+    """How what is selected is moved, turned and scaled.
+
+    operation   what the gizmo does: move, rotate or scale.
+    space       along which axes: world or local.
+    pivot       about which point several are turned and scaled: median (the mean of their positions), active
+                (that of the active one) or individual (each about its own).
+    """
 
     operation: str = "move"
     space: str = "world"
+    pivot: str = "median"
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,13 @@ import numpy.typing as npt
 from imgui_bundle import imgui, imguizmo
 
 from incpt.core import affine
-from incpt.scene import edits
+from incpt.scene import edits, placing
 from incpt.scene.camera import Camera
 from incpt.scene.model import Scene
 from incpt.ui.editor.state import Tool
 from incpt.ui.preferences import SnapSettings
 from incpt.ui.rect import Rect
+from incpt.ui.viewport import pivot
 from incpt.ui.widgets import places
 
 Matrix = npt.NDArray[np.float64]
@@ -64,7 +65,7 @@ class Gizmo:
             self.is_using = self.is_over = False
             self._drag = None
             return scene
-        matrix = self._drag.matrix if self._drag is not None else pivot(scene, visible, tool.space)
+        matrix = self._drag.matrix if self._drag is not None else handles(scene, visible, tool)
         _gizmo.set_drawlist(imgui.get_background_draw_list())
         _gizmo.set_rect(*picture)
         _gizmo.set_gizmo_size_clip_space(0.14)
@@ -80,14 +81,15 @@ class Gizmo:
             flat, None, _gizmo.Matrix3([step] * 3) if snap.enabled else None,
         )  # fmt: skip
         _note_place(view, projection, matrix, picture)
-        return self._follow(scene, visible, matrix, np.array(flat.values, np.float64).reshape(4, 4).T)
+        moved = np.array(flat.values, np.float64).reshape(4, 4).T
+        return self._follow(scene, visible, tool, matrix, moved)
 
     def give_up(self) -> None:
         """Do nothing more until the handle is let go."""
         self._drag = None
         self._is_given_up = self.is_using
 
-    def _follow(self, scene: Scene, names: tuple[str, ...], old: Matrix, new: Matrix) -> Scene:
+    def _follow(self, scene: Scene, names: tuple[str, ...], tool: Tool, old: Matrix, new: Matrix) -> Scene:
         self.is_using, self.is_over = _gizmo.is_using(), _gizmo.is_over()
         if not self.is_using:
             self._is_given_up = False
@@ -100,21 +102,26 @@ class Gizmo:
             return scene
         self._drag.matrix = new
         delta = new @ np.linalg.inv(self._drag.start)
+        if tool.pivot == "individual" and tool.operation != "move":
+            delta[:3, 3] = 0.0
+            old_ones = {name: self._drag.scene.placed(name) for name in names}
+            turned = {n: placing.transformed(o, delta, np.array(o.position)) for n, o in old_ones.items()}
+            return edits.with_all(self._drag.scene, turned)
         return edits.transform_objects(self._drag.scene, names, delta)
 
 
-def pivot(scene: Scene, names: tuple[str, ...], space: str) -> Matrix:
+def handles(scene: Scene, names: tuple[str, ...], tool: Tool) -> Matrix:
     """(4, 4) where the handles stand: the object's own matrix, without shear, which ImGuizmo would take out
-    of what it returns; for several objects the mean of their positions with the axes of the active one
-    (local) or of the world."""
+    of what it returns; for several objects the pivot that they share, with the axes of the active one (local)
+    or of the world."""
     active = scene.placed(names[-1])
     matrix = np.eye(4)
     if len(names) == 1:
         matrix[:3] = affine.compose(active.position, active.rotation, active.scale)
     else:
-        if space == "local":
+        if tool.space == "local":
             matrix[:3, :3] = affine.rotation_matrix(active.rotation)
-        matrix[:3, 3] = np.mean([scene.placed(name).position for name in names], axis=0)
+        matrix[:3, 3] = pivot.shared_point(scene, names, tool.pivot)
     return matrix
 
 

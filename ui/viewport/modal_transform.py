@@ -21,7 +21,7 @@ from incpt.scene import edits, placing
 from incpt.scene.model import Placed, Scene
 from incpt.ui.preferences import SnapSettings
 from incpt.ui.rect import Point, Rect
-from incpt.ui.viewport import axis_constraint, drag_geometry, typed_number
+from incpt.ui.viewport import axis_constraint, drag_geometry, pivot, typed_number
 from incpt.ui.viewport.axis_constraint import AXES, AxisConstraint
 from incpt.ui.viewport.typed_number import TypedNumber
 
@@ -58,18 +58,28 @@ class Input:
 @dataclass(frozen=True)
 class Start:
     """What everything is counted from: the scene, the names of what is transformed, the active one last, the
-    steps of snapping, and the picture's place on the screen, points."""
+    steps of snapping, the picture's place on the screen, points, and about what it is turned, see
+    `Tool.pivot`."""
 
     scene: Scene
     names: tuple[str, ...]
     snap: SnapSettings
     picture: Rect[float]
+    about: str = "median"
 
     @cached_property
     def pivot(self) -> Array:
-        """(3,) the median point: the mean of the positions, world space."""
-        mean: Array = np.mean([self.scene.placed(name).position for name in self.names], axis=0)
-        return mean
+        """(3,) the point that all share, world space."""
+        return pivot.shared_point(self.scene, self.names, self.about)
+
+    def pivot_of(self, name: str) -> Array:
+        """(3,) the point about which one of them is turned and scaled, world space."""
+        return np.asarray(self.scene.placed(name).position) if self.is_each else self.pivot
+
+    @property
+    def is_each(self) -> bool:
+        """Whether each is turned and scaled about its own position."""
+        return self.about == "individual"
 
     @cached_property
     def held(self) -> Array:
@@ -262,26 +272,27 @@ class ModalTransform:
         return placing.moved(one, self.start.axes_of(name, self._is_local) @ self.offset)
 
     def _turned(self, name: str, one: Placed) -> Placed:
-        camera, pivot = self.start.scene.camera, self.start.pivot
+        camera, point = self.start.scene.camera, self.start.pivot_of(name)
         forward = camera.image_plane(1.0)[2]
         if self.constraint is None:
-            return placing.turned(one, forward, self.angle, pivot)
+            return placing.turned(one, forward, self.angle, point)
         axis = self.start.axes_of(name, self._is_local)[:, self.constraint.axis]
         eye = forward if camera.is_orthographic else self.start.held - camera.position
         follows_mouse = self.is_typed or axis @ eye > 0
-        return placing.turned(one, axis, self.angle if follows_mouse else -self.angle, pivot)
+        return placing.turned(one, axis, self.angle if follows_mouse else -self.angle, point)
 
-    def _rolled(self, _name: str, one: Placed) -> Placed:
+    def _rolled(self, name: str, one: Placed) -> Placed:
         right, up, _ = self.start.scene.camera.image_plane(1.0)
         turn = placing.turn_matrix(up / np.linalg.norm(up), self.ball_angles[1])
         turn = placing.turn_matrix(right / np.linalg.norm(right), self.ball_angles[0]) @ turn
-        return placing.turned_by(one, turn, self.start.pivot)
+        return placing.turned_by(one, turn, self.start.pivot_of(name))
 
     def _scaled(self, name: str, one: Placed) -> Placed:
         factors = np.full(3, self.factor)
         if self.constraint is not None:
             factors[[axis for axis in range(3) if axis not in self.constraint.free]] = 1.0
-        return placing.scaled(one, self.start.axes_of(name, self._is_local), tuple(factors), self.start.pivot)
+        axes = self.start.axes_of(name, self._is_local)
+        return placing.scaled(one, axes, tuple(factors), self.start.pivot_of(name))
 
     @property
     def header(self) -> str:
@@ -317,11 +328,12 @@ class ModalTransform:
         space."""
         if self.constraint is None:
             return []
-        names = self.start.names if self.constraint.is_local else self.start.names[-1:]
+        is_each = self.constraint.is_local or self.start.is_each
+        names = self.start.names if is_each else self.start.names[-1:]
         found = []
         for name in names:
             axes = self.start.axes_of(name, self.constraint.is_local)
-            point = self.start.scene.placed(name).position if self.constraint.is_local else self.start.pivot
+            point = self.start.scene.placed(name).position if is_each else self.start.pivot
             found += [(np.asarray(point), axes[:, axis], axis) for axis in self.constraint.free]
         return found
 
@@ -333,12 +345,14 @@ def begun(
     mouse: Point,
     snap: SnapSettings,
     picture: Rect[float],
+    about: str = "median",
 ) -> ModalTransform | None:
-    """A transform of the named objects and lights, of those that are shown; None where none is."""
+    """A transform of the named objects and lights, of those that are shown; None where none is. `about`: see
+    `Tool.pivot`."""
     shown = tuple(name for name in names if scene.placed(name).visible)
     if not shown:
         return None
-    return ModalTransform(Start(scene, shown, snap, picture), operation, mouse, mouse)
+    return ModalTransform(Start(scene, shown, snap, picture, about), operation, mouse, mouse)
 
 
 def _angle(center: Point, start: Point, end: Point) -> float:

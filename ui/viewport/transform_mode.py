@@ -31,11 +31,13 @@ class TransformMode:
         names: tuple[str, ...],
         snap: SnapSettings,
         picture: Rect[float],
+        about: str = "median",
     ) -> None:
-        """Begin one of the named objects that are shown; the picture lies at `picture`, in points."""
+        """Begin one of the named objects that are shown; the picture lies at `picture`, in points. `about`:
+        see `Tool.pivot`."""
         self.label, self._left = beginning.label, scene
         self._now = modal_transform.begun(
-            scene, names, beginning.action, modal_input.mouse(picture.middle), snap, picture
+            scene, names, beginning.action, modal_input.mouse(picture.middle), snap, picture, about
         )
 
     def update(

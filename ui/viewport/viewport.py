@@ -120,7 +120,7 @@ class Viewport:
             light_marks.draw(scene, selection, picture)
         if beginning is not None:
             # What it takes begins with the next frame: the key of this one is that of the command.
-            self._begin(beginning, outcome, preferences.snap, picture)
+            self._begin(beginning, outcome, tool, preferences.snap, picture)
         elif self._transform.is_on:
             outcome = self._use_transform(outcome, preferences.snap, picture)
         elif self._box.is_on:
@@ -164,14 +164,20 @@ class Viewport:
     # ------------------------------------------------------------------- what commands begin here
 
     def _begin(
-        self, beginning: Beginning, outcome: Outcome, snap: SnapSettings, picture: Rect[float]
+        self,
+        beginning: Beginning,
+        outcome: Outcome,
+        tool: Tool,
+        snap: SnapSettings,
+        picture: Rect[float],
     ) -> None:
         self.let_go()
         self.gizmo.is_over = False
         if beginning.action == "box":
             self._box.begin()
             return
-        self._transform.begin(beginning, outcome.scene, outcome.selection.names, snap, picture)
+        names = outcome.selection.names
+        self._transform.begin(beginning, outcome.scene, names, snap, picture, tool.pivot)
 
     def _use_transform(self, outcome: Outcome, snap: SnapSettings, picture: Rect[float]) -> Outcome:
         scene = self._transform.update(

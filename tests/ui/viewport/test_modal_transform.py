@@ -455,3 +455,57 @@ def test_any_events_lead_to_what_a_model_says(events: list[str | Point], names: 
         if abs(np.linalg.det(world[:, :3])) > 1e-6:  # else it is held from being flattened
             found = transform.scene.placed(name).transform.world_from_object
             np.testing.assert_allclose(found, world, rtol=1e-6, atol=1e-6)
+
+
+# ----------------------------------------------------------------------------------------------- the pivot
+
+
+def about(pivot: str, operation: str) -> ModalTransform:
+    made = begun(SCENE, ("cube", "ball"), operation, (500.0, 250.0), SNAP, PICTURE, pivot)
+    assert made is not None
+    return made
+
+
+@pytest.mark.parametrize(
+    ("pivot", "cube", "ball"),
+    [
+        ("median", (-1.0, 0.0, 0.0), (3.0, 0.0, 0.0)),
+        ("active", (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)),
+        ("individual", (0.0, 0.0, 0.0), (2.0, 0.0, 0.0)),
+    ],
+)
+def test_several_are_scaled_about_the_pivot(pivot: str, cube: Point, ball: Point) -> None:
+    done = typed(about(pivot, "scale"), "2").scene
+    assert done.object("cube").position == pytest.approx(cube)
+    assert done.object("ball").position == pytest.approx(ball)
+    assert done.object("ball").scale == (2.0, 2.0, 2.0), "whatever the pivot, the size is the same"
+
+
+@pytest.mark.parametrize(
+    ("pivot", "cube", "ball"),
+    [
+        ("median", (1.0, -1.0, 0.0), (1.0, 1.0, 0.0)),
+        ("active", (2.0, -2.0, 0.0), (2.0, 0.0, 0.0)),
+        ("individual", (0.0, 0.0, 0.0), (2.0, 0.0, 0.0)),
+    ],
+)
+def test_several_are_turned_about_the_pivot(pivot: str, cube: Point, ball: Point) -> None:
+    done = typed(keys(about(pivot, "rotate"), "z"), "90").scene
+    assert done.object("cube").position == pytest.approx(cube)
+    assert done.object("ball").position == pytest.approx(ball)
+    assert done.object("ball").rotation == pytest.approx((0, 0, 90))
+
+
+def test_the_mouse_is_measured_from_the_pivot() -> None:
+    assert about("active", "rotate").start.center == pytest.approx(
+        (MIDDLE[0] + 2 * POINTS_PER_METRE, MIDDLE[1])
+    )
+    assert about("median", "rotate").start.center == pytest.approx((MIDDLE[0] + POINTS_PER_METRE, MIDDLE[1]))
+
+
+def test_a_move_is_the_same_about_every_pivot() -> None:
+    places = {
+        pivot: typed(about(pivot, "move"), "1").scene.object("cube").position
+        for pivot in ("median", "active", "individual")
+    }
+    assert len(set(places.values())) == 1

@@ -286,6 +286,23 @@ def test_the_gizmo_turns_and_scales(user: Desk) -> None:
     assert user.scene == SCENE
 
 
+@pytest.mark.parametrize(
+    ("pivot", "parts"), [("Own origins", {"scale"}), ("Median point", {"scale", "position"})]
+)
+def test_the_gizmo_and_keys_scale_about_the_pivot(user: Desk, pivot: str, parts: set[str]) -> None:
+    user.editor.select(Selection(("red cube", "lamp")))
+    user.run(pivot)
+    user.run("Scale handles")
+    x, y = user.place("gizmo")
+    user.drag_at((x, y), (60.0, 0.0))
+    assert {p.split(".")[2] for p in changes(flat(SCENE), flat(user.scene))} == parts
+    user.key("Ctrl+Z")
+    user.run("Scale")
+    user.write("2")
+    user.key("Enter")
+    assert {p.split(".")[2] for p in changes(flat(SCENE), flat(user.scene))} == parts
+
+
 @pytest.mark.parametrize("keys", ["Escape", "Ctrl+Z"])
 def test_a_drag_of_the_gizmo_is_given_up(user: Desk, keys: str) -> None:
     user.editor.select(Selection(("red cube",)))
