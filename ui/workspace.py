@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from imgui_bundle import imgui
 
 from incpt.device.device import all_devices, device_name
 from incpt.render.strategies import strategy_of
-from incpt.scene import edits
+from incpt.scene import edits, several
+from incpt.scene.light import Light
+from incpt.scene.model import Object, Placed
 from incpt.ui.commands import camera, command, files, materials, menus, objects, rendering
 from incpt.ui.editor.editor import Editor
 from incpt.ui.editor.records import Records
@@ -24,7 +27,7 @@ from incpt.ui.panels import notices, outliner, plots, render, tool, transform
 from incpt.ui.panels import textures as textures_panel
 from incpt.ui.panels.outliner import OutlinerState
 from incpt.ui.rect import Rect
-from incpt.ui.widgets import focus, places, widgets
+from incpt.ui.widgets import focus, mixed, places, widgets
 from incpt.ui.widgets.refusals import Refusals
 
 
@@ -106,27 +109,47 @@ class Workspace:
         one = editor.scene.placed(name)
         with widgets.section("Transform") as is_open:
             if is_open:
-                new, self._is_uniform = transform.draw(one, self._is_uniform, refusals)
-                if new is not one:
-                    editor.propose(edits.with_all(editor.scene, {name: new}), "Transform", _key())
+                self._draw_transform(editor, one, refusals)
         if name in editor.scene.light_index:
             _draw_light(editor, name, refusals)
         else:
             self._draw_material(editor, name, refusals)
         _tell(editor, refusals)
 
+    def _draw_transform(self, editor: Editor, one: Placed, refusals: Refusals) -> None:
+        is_uniform, others = self._is_uniform, _others(editor)
+        with mixed.marking(lambda placed: transform.draw(placed, is_uniform, Refusals()), one, others):
+            new, self._is_uniform = transform.draw(one, is_uniform, refusals)
+        given = [transform.COMPONENTS[label] for label in mixed.given()]
+        if new is one and not given:
+            return
+        # A drag moves all of them as far; what is typed, and a button, holds for all.
+        is_dragged = imgui.is_mouse_down(imgui.MouseButton_.left) and not focus.is_typing()
+        alike = partial(several.transformed_alike, one, new, is_relative=is_dragged, given=given)
+        changed = {one.name: new, **{other.name: alike(other) for other in others}}
+        editor.propose(edits.with_all(editor.scene, changed), "Transform", _key())
+
     def _draw_material(self, editor: Editor, name: str, refusals: Refusals) -> None:
         scene = editor.scene
         material = scene.object(name).material
+        objects = [one for one in _others(editor) if isinstance(one, Object)]
+        others = list(dict.fromkeys(one.material for one in objects if one.material != material))
         with widgets.section("Material") as is_open:
             if not is_open:
                 return
             users = sum(o.material == material for o in scene.objects)
-            outcome = material_panel.draw_choice(tuple(scene.materials), material, users)
-            new = material_panel.draw(scene.materials[material], refusals)
+            names = tuple(scene.materials)
+            with mixed.marking(lambda one: material_panel.draw_choice(names, one, 0), material, others):
+                outcome = material_panel.draw_choice(names, material, users)
+            materials = dict(scene.materials)
+            old, beside = materials[material], [materials[other] for other in others]
+            with mixed.marking(lambda one: material_panel.draw(one, Refusals()), old, beside):
+                new = material_panel.draw(old, refusals)
+            for other in others if new is not old else ():
+                materials[other] = several.material_alike(old, new, materials[other])
             new, wanted = textures_panel.draw(new, refusals)
-        if new is not scene.materials[material]:
-            materials = {**scene.materials, material: new}
+        if new is not old:
+            materials[material] = new
             editor.propose(replace(scene, materials=materials), f"Material {material}", _key())
         editor.attempt(lambda: _apply_material_outcome(editor, material, outcome))
         if wanted.choose is not None:
@@ -205,9 +228,17 @@ def _draw_light(editor: Editor, name: str, refusals: Refusals) -> None:
     with widgets.section("Light") as is_open:
         if is_open:
             light = editor.scene.light(name)
-            new = light_panel.draw(light, refusals)
+            others = [one for one in _others(editor) if isinstance(one, Light)]
+            with mixed.marking(lambda one: light_panel.draw(one, Refusals()), light, others):
+                new = light_panel.draw(light, refusals)
             if new is not light:
-                editor.propose(edits.with_all(editor.scene, {name: new}), f"Light {name}", _key())
+                alike = {other.name: several.light_alike(light, new, other) for other in others}
+                editor.propose(edits.with_all(editor.scene, {name: new, **alike}), f"Light {name}", _key())
+
+
+def _others(editor: Editor) -> list[Placed]:
+    """What is selected beside the active one."""
+    return [editor.scene.placed(name) for name in editor.selection.names[:-1]]
 
 
 def _draw_notices(editor: Editor, area: Rect[float]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from incpt.scene.material import Material
-from incpt.ui.widgets import widgets
+from incpt.ui.widgets import mixed, widgets
 from incpt.ui.widgets.refusals import Refusals
 
 
@@ -32,7 +32,8 @@ def draw_choice(names: tuple[str, ...], current: str, users: int) -> Outcome:
         is_rename = widgets.button("Rename…##material")
         widgets.same_line()
         is_delete = widgets.button("Delete##material", "A material that objects have asks for another first")
-    return Outcome(chosen if chosen != current else None, is_new, is_duplicate, is_rename, is_delete)
+    is_assigned = chosen != current or "Material" in mixed.given()
+    return Outcome(chosen if is_assigned else None, is_new, is_duplicate, is_rename, is_delete)
 
 
 def draw(material: Material, refusals: Refusals) -> Material:

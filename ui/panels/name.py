@@ -14,5 +14,5 @@ def draw(name: str, selected: int) -> str | None:
     """The name of the active one of so many selected objects; returns another one when it was typed."""
     typed = widgets.text("Name", name)
     if typed is None and selected > 1:
-        widgets.note(f"{selected} objects are selected; the fields show this one.")
+        widgets.note(f"{selected:,} are selected; what is changed below is changed for all of them.")
     return typed

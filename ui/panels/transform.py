@@ -13,6 +13,13 @@ from incpt.ui.widgets.refusals import Refusals
 
 T = TypeVar("T", bound=Placed)
 
+COMPONENTS = {
+    f"{part.capitalize()} {axis}": (part, i)
+    for part in ("position", "rotation", "scale")
+    for i, axis in enumerate("XYZ")
+}
+"""(part, axis) of each field, by its label."""
+
 
 def draw(obj: T, is_uniform: bool, refusals: Refusals) -> tuple[T, bool]:
     """Fields for the transform; returns the object or light after this frame, and whether scale keeps its

@@ -16,6 +16,8 @@ _BUTTONS_OF_PICTURE = (imgui.MouseButton_.right, imgui.MouseButton_.middle)
 """Buttons by whose press imgui itself ends no typing."""
 _is_typing = [False]
 """Whether the keys of this frame go to a field; a list of one, so that functions can set it."""
+_has_edited = [False]
+"""Whether the text of that field was changed since it was opened."""
 
 
 def begin_frame() -> None:
@@ -25,6 +27,7 @@ def begin_frame() -> None:
         imgui.internal.clear_active_id()
         typed = 0
     _is_typing[0] = typed != 0
+    _has_edited[0] = typed != 0 and imgui.get_current_context().input_text_state.edited_before
     if not typed and not imgui.is_key_down(imgui.Key.tab):
         # imgui goes to the next field by a Tab that nobody owns, wherever one was typed into last.
         imgui.internal.set_key_owner(imgui.Key.tab, _TAB_OWNER)
@@ -33,6 +36,11 @@ def begin_frame() -> None:
 def is_typing() -> bool:
     """Whether the keys of this frame go to a field, the one that ends the typing among them."""
     return _is_typing[0]
+
+
+def has_typed() -> bool:
+    """For a field that is left in this frame: whether a text was typed, and not given up by Escape."""
+    return _has_edited[0] and not imgui.is_key_pressed(imgui.Key.escape, False)
 
 
 def _typed_field() -> int:

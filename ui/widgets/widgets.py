@@ -14,7 +14,7 @@ from imgui_bundle import imgui
 
 from incpt.core.affine import Vector
 from incpt.picture.color import linear_from_srgb, srgb_from_linear
-from incpt.ui.widgets import places, theme
+from incpt.ui.widgets import focus, mixed, places, theme
 
 _AXES = ("X", "Y", "Z")
 """Names of the fields of a vector."""
@@ -27,6 +27,9 @@ _edited = [0]
 @contextmanager
 def row(label: str, tip: str = "") -> Iterator[str]:
     """A row with a label; yields the hidden label for the field, which gets the width that is left."""
+    if mixed.is_silent():
+        yield ""
+        return
     width = imgui.get_content_region_avail().x
     start = imgui.get_cursor_pos_x()
     imgui.align_text_to_frame_padding()
@@ -51,9 +54,11 @@ def number(
     logarithmic: bool = False,
 ) -> float:
     """A number to drag, or to type after a double click. `low` and `high` bound the drag only."""
+    if mixed.is_told(label, value):
+        return value
     flags = imgui.SliderFlags_.logarithmic if logarithmic else imgui.SliderFlags_.none
     with row(label, tip) as field:
-        form = f"%.{decimals}f{_escaped(unit)}"
+        form = _form(label, decimals, unit)
         changed, result = imgui.drag_float(field, value, speed, low, high, form, flags)
         _note(label, changed)
     return result if changed else value
@@ -72,12 +77,14 @@ def whole_number(
 ) -> int:
     """A whole number to drag or to type, held between `low` and `high`. Where it is not `enabled`, the tip
     says `why_not`."""
+    if mixed.is_told(label, value):
+        return value
     with row(label, tip if enabled else f"{tip}. {why_not}") as field:
         # A file may hold numbers beyond the bounds of the widget, or beyond imgui's 32 bits.
         shown = min(max(value, -(1 << 31)), (1 << 31) - 1)
         flags = imgui.SliderFlags_.always_clamp
         imgui.begin_disabled(not enabled)
-        changed, result = imgui.drag_int(field, shown, speed, low, high, "%d", flags)
+        changed, result = imgui.drag_int(field, shown, speed, low, high, _form(label, None), flags)
         imgui.end_disabled()
         _note(label, changed)
         if not enabled and imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
@@ -98,14 +105,19 @@ def vector(
     names: Sequence[str] = _AXES,
 ) -> Vector:
     """Three numbers below one another, each with the colour of its axis. Named "label X" and so on."""
+    labels = [f"{label} {name}" for name in names]
+    if mixed.is_silent():
+        for one, component in zip(labels, value, strict=True):
+            mixed.is_told(one, component)
+        return value
     result = list(value)
     imgui.push_id(label)
     for axis, name in enumerate(names):
         with row(label if axis == 0 else "", tip):
             _axis_mark(axis, name)
-            form = f"%.{decimals}f{_escaped(unit)}"
+            form = _form(labels[axis], decimals, unit)
             changed, typed = imgui.drag_float(f"##{axis}", value[axis], speed, low, high, form)
-            _note(f"{label} {name}", changed)
+            _note(labels[axis], changed)
         if changed:
             result[axis] = typed
     imgui.pop_id()
@@ -115,13 +127,21 @@ def vector(
 def color(label: str, value: Vector, *, is_radiance: bool = False, tip: str = "") -> Vector:
     """A linear RGB colour, which people see and type in sRGB, as in other programs: numbers, hex (by a right
     click) and the picker. Where `is_radiance`, components may be over 1."""
+    if mixed.is_told(label, value):
+        return value
     flags = imgui.ColorEditFlags_.float
     if is_radiance:
         flags |= imgui.ColorEditFlags_.hdr
+    if mixed.is_in(label):
+        flags |= imgui.ColorEditFlags_.no_inputs
+        tip = f"{_MIXED_COLOR}. {tip}" if tip else _MIXED_COLOR
     with row(label, f"{tip}. {_SRGB}" if tip else _SRGB) as field:
         shown = [_rounded(float(c)) for c in srgb_from_linear(value)]
         changed, result = imgui.color_edit3(field, shown, flags)
         _note(label, changed)
+        if mixed.is_in(label):
+            same_line()
+            imgui.text_disabled(mixed.TEXT)
     # A component that was not touched keeps its value to the bit; imgui's 32 bits would round it.
     r, g, b = (
         old if new == seen else float(linear_from_srgb(new))
@@ -147,17 +167,23 @@ def radiance(label: str, value: Vector, tip: str = "") -> Vector:
 
 def checkbox(label: str, value: bool, tip: str = "") -> bool:
     """On or off."""
+    if mixed.is_told(label, value):
+        return value
     with row(label, tip) as field:
+        imgui.push_item_flag(imgui.ItemFlags_.mixed_value, mixed.is_in(label))
         changed, result = imgui.checkbox(field, value)
+        imgui.pop_item_flag()
         _note(label, changed)
     return result
 
 
 def choice(label: str, value: str, options: Sequence[tuple[str, str]], tip: str = "") -> str:
     """One of `options`, given as (value, text)."""
+    if mixed.is_told(label, value):
+        return value
     texts = dict(options)
     with row(label, tip) as field:
-        shown = texts.get(value, value)
+        shown = mixed.TEXT if mixed.is_in(label) else texts.get(value, value)
         is_open = imgui.begin_combo(field, shown, imgui.ComboFlags_.height_large)
         places.note(label)
         arrow = imgui.get_frame_height() + imgui.get_style().frame_padding.x
@@ -165,10 +191,11 @@ def choice(label: str, value: str, options: Sequence[tuple[str, str]], tip: str 
             imgui.set_item_tooltip(shown)
         if is_open:
             for option, text in options:
-                chosen = imgui.selectable(text, option == value)[0]
+                chosen = imgui.selectable(text, option == value and not mixed.is_in(label))[0]
                 _note(f"{label}: {text}", chosen)
                 if chosen:
                     value = option
+                    mixed.give(label)
             imgui.end_combo()
     return value
 
@@ -183,6 +210,8 @@ def text(label: str, value: str, tip: str = "") -> str | None:
 
 def button(label: str, tip: str = "", *, enabled: bool = True, width: float = 0.0) -> bool:
     """Whether it was pressed."""
+    if mixed.is_silent():
+        return False
     imgui.begin_disabled(not enabled)
     pressed = imgui.button(label, imgui.ImVec2(width, 0.0))
     imgui.end_disabled()
@@ -194,6 +223,8 @@ def button(label: str, tip: str = "", *, enabled: bool = True, width: float = 0.
 
 def same_line() -> None:
     """The next button stands beside the last one."""
+    if mixed.is_silent():
+        return
     imgui.same_line(0.0, imgui.get_style().item_inner_spacing.x)
 
 
@@ -208,6 +239,9 @@ def value_row(label: str, value: str, tip: str = "") -> None:
 @contextmanager
 def section(label: str, is_open: bool = True) -> Iterator[bool]:
     """A part of a panel with a header that folds it; yields whether it is unfolded."""
+    if mixed.is_silent():
+        yield True
+        return
     flags = imgui.TreeNodeFlags_.default_open if is_open else imgui.TreeNodeFlags_.none
     shown = imgui.collapsing_header(label, flags)
     places.note(label)
@@ -230,7 +264,11 @@ def edited() -> int:
 
 def _note(name: str, has_changed: bool) -> None:
     places.note(name)
-    if has_changed:
+    # imgui tells of no change where the number that was typed is the one that the first object has.
+    is_given = mixed.is_in(name) and imgui.is_item_deactivated() and focus.has_typed()
+    if is_given:
+        mixed.give(name)
+    if has_changed or is_given:
         _edited[0] = imgui.get_item_id()
 
 
@@ -255,6 +293,7 @@ def _clipped_text(label: str, width: float) -> None:
         imgui.set_item_tooltip(label)
 
 
+_MIXED_COLOR = "Differs among what is selected; another one is for all of it"
 _SRGB = "In sRGB here; files and Python have it linear"
 
 
@@ -262,5 +301,9 @@ def _rounded(value: float) -> float:
     return float(np.float32(value))
 
 
-def _escaped(unit: str) -> str:
-    return unit.replace("%", "%%")
+def _form(label: str, decimals: int | None, unit: str = "") -> str:
+    """How imgui prints a number: with so many decimals (None: a whole one) and a unit, or that it differs."""
+    if mixed.is_in(label):
+        return mixed.TEXT
+    number = "%d" if decimals is None else f"%.{decimals}f"
+    return number + unit.replace("%", "%%")
