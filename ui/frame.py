@@ -8,6 +8,7 @@ from incpt.ui.display.display import Display
 from incpt.ui.display.outline import Outlined
 from incpt.ui.display.overlays import Overlay
 from incpt.ui.editor.editor import Editor
+from incpt.ui.panels import materials
 from incpt.ui.rect import Rect
 from incpt.ui.viewport import captions
 from incpt.ui.viewport.viewport import Outcome, Viewport, picture_rect, pixels_in
@@ -35,6 +36,7 @@ def take_frame(
         beginning=editor.gesture.beginning,
     )
     _take_outcome(editor, outcome)
+    _take_material(editor, picture)
     captions.draw(editor.frame, overlay, editor.preferences.display, picture)
     editor.settle(viewport.is_held or imgui.is_any_item_active(), viewport.is_flying, viewport.hint)
     return area
@@ -57,6 +59,16 @@ def draw_picture(
         selection=selection,
         scale=scale,
     )
+
+
+def _take_material(editor: Editor, picture: Rect[int]) -> None:
+    """A material that is dragged out of its list, and let go over the picture."""
+    carried = materials.carried(tuple(editor.scene.materials))
+    mouse = imgui.get_mouse_pos()
+    is_over_panel = imgui.is_window_hovered(imgui.HoveredFlags_.any_window)
+    is_let_go = imgui.is_mouse_released(imgui.MouseButton_.left)
+    if carried is not None and is_let_go and not is_over_panel and picture.contains((mouse.x, mouse.y)):
+        editor.drop_material(carried, picture.relative((mouse.x, mouse.y)))
 
 
 def _take_outcome(editor: Editor, outcome: Outcome) -> None:

@@ -8,7 +8,7 @@ from incpt.ui.rect import Rect
 
 _RIGHT_SHARE, _OUTLINER_SHARE = 0.25, 0.28
 """Width of the panels as a share of the window's, and height of the outliner as a share of theirs."""
-_LEAST_WIDTH = 310.0
+_LEAST_WIDTH = 340.0
 """Least width of the panels, in points at a scale of 1: every tab can be seen."""
 
 
@@ -49,6 +49,6 @@ def _lay_out(root: int) -> None:
     _, right, _ = builder.dock_builder_split_node_py(root, imgui.Dir.right, share)
     _, top, bottom = builder.dock_builder_split_node_py(right, imgui.Dir.up, _OUTLINER_SHARE)
     builder.dock_builder_dock_window("Outliner", top)
-    for name in ("Object", "Scene", "Render", "Method"):
+    for name in ("Object", "Materials", "Scene", "Render", "Method"):
         builder.dock_builder_dock_window(name, bottom)
     builder.dock_builder_finish(root)

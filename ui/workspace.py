@@ -22,9 +22,11 @@ from incpt.ui.panels import display as display_panel
 from incpt.ui.panels import environment as environment_panel
 from incpt.ui.panels import light as light_panel
 from incpt.ui.panels import material as material_panel
+from incpt.ui.panels import materials as materials_panel
 from incpt.ui.panels import name as name_panel
 from incpt.ui.panels import notices, outliner, plots, render, tool, transform
 from incpt.ui.panels import textures as textures_panel
+from incpt.ui.panels.materials import MaterialsState
 from incpt.ui.panels.outliner import OutlinerState
 from incpt.ui.rect import Rect
 from incpt.ui.widgets import focus, mixed, places, widgets
@@ -37,6 +39,7 @@ class Workspace:
     def __init__(self) -> None:
         self.records = Records()
         self._outliner = OutlinerState()
+        self._materials = MaterialsState()
         self._is_uniform = True
         self._devices: list[str] | None = None
         self._layout = Layout()
@@ -58,6 +61,7 @@ class Workspace:
             imgui.set_window_focus("Outliner")
         self._window("Outliner", editor, self._draw_outliner)
         self._window("Object", editor, self._draw_object)
+        self._window("Materials", editor, self._draw_materials)
         self._window("Scene", editor, self._draw_scene)
         self._window("Render", editor, self._draw_render)
         self._window("Method", editor, self._draw_method)
@@ -70,6 +74,10 @@ class Workspace:
         return area
 
     def _window(self, name: str, editor: Editor, draw: Callable[[Editor], None]) -> None:
+        # A panel that the layout of an earlier version does not know stands beside the object's.
+        beside = imgui.internal.find_window_by_name("Object")
+        if beside is not None:
+            imgui.set_next_window_dock_id(beside.dock_id, imgui.Cond_.first_use_ever)
         if imgui.begin(name, None, imgui.WindowFlags_.no_collapse)[0]:
             draw(editor)
         imgui.end()
@@ -88,6 +96,10 @@ class Workspace:
             is_shown = editor.scene.placed(outcome.switched).visible
             scene = edits.set_visible(editor.scene, (outcome.switched,), not is_shown)
             editor.propose(scene, "Hide" if is_shown else "Show")
+        if outcome.made_of is not None:
+            name, material = outcome.made_of
+            scene = edits.assign_material(editor.scene, (name,), material)
+            editor.propose(scene, "Assign material")
         if outcome.renamed is not None:
             old, new = outcome.renamed
             editor.attempt(lambda: objects.rename_to(editor, old, new))
@@ -154,6 +166,27 @@ class Workspace:
         editor.attempt(lambda: _apply_material_outcome(editor, material, outcome))
         if wanted.choose is not None:
             files.choose_texture(editor, material, wanted.choose)
+
+    def _draw_materials(self, editor: Editor) -> None:
+        refusals, scene = Refusals(), editor.scene
+        selected = [scene.objects[scene.object_index[n]] for n in editor.selection if n in scene.object_index]
+        followed = selected[-1].material if selected else None
+        state = self._materials.following(followed, scene.materials)
+        users = edits.material_users(scene)
+        outcome, self._materials = materials_panel.draw(scene.materials, users, state, bool(selected))
+        chosen = self._materials.chosen
+        if chosen is not None:
+            with widgets.section(f"{chosen}###chosen") as is_open:
+                if is_open:
+                    old = scene.materials[chosen]
+                    new, wanted = textures_panel.draw(material_panel.draw(old, refusals), refusals)
+                    if new is not old:
+                        changed = replace(scene, materials={**scene.materials, chosen: new})
+                        editor.propose(changed, f"Material {chosen}", _key())
+                    if wanted.choose is not None:
+                        files.choose_texture(editor, chosen, wanted.choose)
+        editor.attempt(lambda: _apply_materials_outcome(editor, outcome))
+        _tell(editor, refusals)
 
     def _draw_scene(self, editor: Editor) -> None:
         refusals = Refusals()
@@ -282,13 +315,28 @@ def _apply_camera_outcome(editor: Editor, outcome: camera_panel.Outcome) -> None
 
 def _apply_material_outcome(editor: Editor, material: str, outcome: material_panel.Outcome) -> None:
     if outcome.assign is not None:
-        scene = edits.assign_material(editor.scene, editor.selection.names, outcome.assign)
-        editor.propose(scene, "Assign material")
+        materials.assign(editor, outcome.assign)
     if outcome.is_new:
         materials.new_material(editor)
     if outcome.is_duplicate:
         materials.duplicate_material(editor, material)
     if outcome.is_delete:
-        editor.propose(edits.delete_material(editor.scene, material), "Delete material")
+        materials.delete_material(editor, material)
     if outcome.is_rename:
         materials.rename_material(editor, material)
+
+
+def _apply_materials_outcome(editor: Editor, outcome: materials_panel.Outcome) -> None:
+    if outcome.is_new:
+        materials.new_material(editor)
+    if outcome.is_purge:
+        materials.purge(editor)
+    for wanted, act in (
+        (outcome.duplicate, materials.copy_material),
+        (outcome.rename, materials.rename_material),
+        (outcome.delete, materials.delete_material),
+        (outcome.assign, materials.assign),
+        (outcome.select, materials.select_users),
+    ):
+        if wanted is not None:
+            act(editor, wanted)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -249,14 +250,30 @@ def duplicate_material(scene: Scene, name: str) -> tuple[Scene, str]:
     return add_material(scene, name, scene.material(name))
 
 
-def delete_material(scene: Scene, name: str) -> Scene:
-    """The scene without a material. Raises InputError while objects use it, with their names."""
+def delete_material(scene: Scene, name: str, replacement: str | None = None) -> Scene:
+    """The scene without a material; objects that have it get `replacement`. Raises InputError while objects
+    use it and there is none, with their names."""
     scene.material(name)
     users = [o.name for o in scene.objects if o.material == name]
+    if users and replacement is not None:
+        if replacement == name:
+            raise InputError(f"material {name!r}: cannot take its own place; choose another one")
+        scene, users = assign_material(scene, users, replacement), []
     if users:
         listed = ", ".join(users[:5]) + (f" and {len(users) - 5} more" if len(users) > 5 else "")
         raise InputError(f"material {name!r}: is used by {listed}; give them another one first")
     return replace(scene, materials={n: m for n, m in scene.materials.items() if n != name})
+
+
+def purge_materials(scene: Scene) -> Scene:
+    """The scene without the materials that no object has."""
+    used = material_users(scene)
+    return replace(scene, materials={n: m for n, m in scene.materials.items() if n in used})
+
+
+def material_users(scene: Scene) -> Counter[str]:
+    """How many objects have each material, by its name."""
+    return Counter(obj.material for obj in scene.objects)
 
 
 def rename_material(scene: Scene, old: str, new: str) -> Scene:
@@ -310,11 +327,13 @@ def _checked_name(new: str, old: str, taken: Collection[str], what: str) -> str:
 
 
 def _with_each(scene: Scene, names: Iterable[str], changes: Mapping[str, Any]) -> Scene:
-    for name in names:
-        one = scene.placed(name)
-        if any(getattr(one, key) != value for key, value in changes.items()):
-            scene = scene.with_placed(name, **changes)
-    return scene
+    # At once, because there may be thousands, and each scene of its own would look at all of them.
+    changed = {
+        name: replace(one, **changes)
+        for name in names
+        if any(getattr(one := scene.placed(name), key) != value for key, value in changes.items())
+    }
+    return with_all(scene, changed) if changed else scene
 
 
 def _with_material_for_new(scene: Scene, material: str | None) -> tuple[Scene, str]:

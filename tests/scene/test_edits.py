@@ -164,6 +164,16 @@ def test_materials_come_and_go() -> None:
     assert name == "red.001" and scene.materials[name] == SCENE.materials["red"]
     with pytest.raises(InputError, match="used by cube, ball"):
         edits.delete_material(SCENE, "red")
+    with pytest.raises(InputError, match="cannot take its own place"):
+        edits.delete_material(SCENE, "red", "red")
+    assert edits.purge_materials(scene).materials.keys() == {"red", "blue"}
+    assert edits.material_users(SCENE) == {"red": 2, "blue": 1}
+
+
+def test_a_material_is_deleted_and_another_takes_its_place() -> None:
+    scene = edits.delete_material(SCENE, "red", "grey")
+    assert "red" not in scene.materials and [o.material for o in scene.objects] == ["grey", "grey", "blue"]
+    assert edits.delete_material(SCENE, "grey", "red") == edits.delete_material(SCENE, "grey")
 
 
 def test_renaming_a_material_keeps_its_place_and_users() -> None:

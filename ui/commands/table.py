@@ -13,7 +13,7 @@ from typing import Any
 from incpt.picture import denoise
 from incpt.scene.edits import LIGHT_NAMES
 from incpt.scene.shapes import SHAPES
-from incpt.ui.commands import camera, files, objects, pictures, rendering
+from incpt.ui.commands import camera, files, materials, objects, pictures, rendering
 from incpt.ui.commands.command import Action, Command, Test
 from incpt.ui.dialogs.about import About
 from incpt.ui.dialogs.help_page import HelpPage
@@ -208,6 +208,8 @@ COMMANDS: tuple[Command, ...] = (
             help="Hide the selected objects"),
     Command("Show all", "Object", objects.show_all, "Alt+H", plain_keys="Shift+H", group=2,
             help="Show hidden objects again"),
+    Command("Delete unused materials", "Object", materials.purge, group=2,
+            help="Those that no object has"),
     Command("Clear position", "Object/Clear", _clear("position"), "Alt+G", enabled=_selected, group=3,
             help="To the origin"),
     Command("Clear rotation", "Object/Clear", _clear("rotation"), "Alt+R", enabled=_selected, group=3,

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from incpt.core.errors import DeviceError, InputError, OutputError, one_line
 from incpt.picture import denoise
+from incpt.scene import edits
 from incpt.scene.edits import Copied
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
@@ -148,6 +149,11 @@ class Editor:
         self.screen = replace(self.screen, menu_point=pick.point if wants_menu else None)
         self.renderer.request(pick)
 
+    def drop_material(self, material: str, point: tuple[float, float]) -> None:
+        """Give a material to the object that is at a point of the picture."""
+        self.screen = replace(self.screen, dropped=(material, point))
+        self.renderer.request(Pick(point))
+
     def open_menu(self, name: str) -> None:
         """Open a menu at the mouse in the next frame."""
         self.screen = replace(self.screen, wanted_menu=name)
@@ -239,12 +245,23 @@ class Editor:
         return messages
 
     def _take_pick(self, picked: Picked) -> None:
+        dropped = self.screen.dropped
+        if dropped is not None and picked.point == dropped[1]:
+            self.screen = replace(self.screen, dropped=None)
+            self.attempt(lambda: self._assign_dropped(dropped[0], picked.name))
+            return
         is_for_menu = picked.point == self.screen.menu_point and picked.name in self.selection
         self.screen = replace(self.screen, menu_point=None)
         if is_for_menu:
             self.open_menu("selection")
         else:
             self.select(self.selection.clicked(picked.name, picked.additive))
+
+    def _assign_dropped(self, material: str, name: str | None) -> None:
+        if name is None or name not in self.scene.object_index:
+            self.say("No object is there to be given a material", "warning")
+            return
+        self.propose(edits.assign_material(self.scene, (name,), material), "Assign material")
 
     def settle(self, is_held: bool, is_flying: bool = False, hint: str = "") -> None:
         """End a frame; `is_held` tells whether a widget, the gizmo or the camera is being dragged, or a

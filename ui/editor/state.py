@@ -114,6 +114,7 @@ class Screen:
     wanted_menu          the menu that is to open at the mouse, by name; empty: none.
     is_renaming          the name of the active one is to be typed in the outliner.
     menu_point           where in the picture a menu was asked for, until it is known what is there.
+    dropped              the material that was dropped on the picture, and where, until then.
     """
 
     viewport_size: tuple[int, int] | None = None
@@ -122,3 +123,4 @@ class Screen:
     wanted_menu: str = ""
     is_renaming: bool = False
     menu_point: tuple[float, float] | None = None
+    dropped: tuple[str, tuple[float, float]] | None = None

@@ -31,7 +31,9 @@ def draw_choice(names: tuple[str, ...], current: str, users: int) -> Outcome:
     with widgets.row("", ""):
         is_rename = widgets.button("Rename…##material")
         widgets.same_line()
-        is_delete = widgets.button("Delete##material", "A material that objects have asks for another first")
+        is_delete = widgets.button(
+            "Delete##material", "Where objects have it, another is asked for in its place"
+        )
     is_assigned = chosen != current or "Material" in mixed.given()
     return Outcome(chosen if is_assigned else None, is_new, is_duplicate, is_rename, is_delete)
 

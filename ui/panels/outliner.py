@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from imgui_bundle import imgui
 
 from incpt.scene.light import Light
-from incpt.scene.model import Placed, Scene
+from incpt.scene.model import Object, Placed, Scene
 from incpt.scene.selection import Selection
+from incpt.ui.panels import materials
 from incpt.ui.widgets import icons, places, theme
 
 
@@ -38,12 +39,13 @@ class OutlinerState:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What the user did in a frame: the selection after it, an object or light to show or hide, and one with
-    the name that was typed for it."""
+    """What the user did in a frame: the selection after it, an object or light to show or hide, one with the
+    name that was typed for it, and an object with the material that was dropped on it."""
 
     selection: Selection
     switched: str | None = None
     renamed: tuple[str, str] | None = None
+    made_of: tuple[str, str] | None = None
 
 
 def draw(scene: Scene, selection: Selection, state: OutlinerState) -> tuple[Outcome, OutlinerState]:
@@ -84,16 +86,16 @@ def _rows(
             if name == state.renaming:
                 outcome, state = _name_field(name, outcome, state)
             else:
-                outcome, state = _row(scene.placed(name), outcome, state, names)
+                outcome, state = _row(scene, name, outcome, state, names)
             if name in (sought, state.renaming if state.is_opening else None):
                 imgui.internal.scroll_to_item(imgui.internal.ScrollFlags_.keep_visible_edge_y)
     return outcome, state
 
 
 def _row(
-    one: Placed, outcome: Outcome, state: OutlinerState, names: list[str]
+    scene: Scene, name: str, outcome: Outcome, state: OutlinerState, names: list[str]
 ) -> tuple[Outcome, OutlinerState]:
-    name, selection = one.name, outcome.selection
+    one, selection = scene.placed(name), outcome.selection
     imgui.push_id(name)
     eye = icons.EYE if one.visible else icons.EYE_SLASH
     style = imgui.get_style()
@@ -106,6 +108,9 @@ def _row(
     pressed, _ = imgui.selectable(label, name in selection.names, flags, imgui.ImVec2(width - button, 0))
     imgui.pop_style_color()
     places.note(f"object {name}")
+    material = materials.dropped_on_item(tuple(scene.materials)) if isinstance(one, Object) else None
+    if material is not None:
+        outcome = replace(outcome, made_of=(name, material))
     if _is_missing(one):
         imgui.set_item_tooltip(f"Its mesh is missing: {one.mesh.source.file}")  # type: ignore[union-attr]
     if pressed and imgui.is_mouse_double_clicked(0):
