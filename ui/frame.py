@@ -27,7 +27,7 @@ def take_frame(
     if editor.gesture.is_cancelled:
         viewport.let_go()
     outcome = viewport.update(
-        editor.scene,
+        editor.shown,
         editor.selection,
         editor.tool,
         editor.preferences,
@@ -50,7 +50,7 @@ def draw_picture(
     selection = None
     if editor.selection:
         names = frozenset(editor.selection.names)
-        selection = Outlined(editor.scene, names, editor.selection.active)
+        selection = Outlined(editor.shown, names, editor.selection.active)
     display.draw(
         picture_rect(area, editor.scene.settings.size).scaled(scale),
         editor.preferences.display,
@@ -73,7 +73,10 @@ def _take_material(editor: Editor, picture: Rect[int]) -> None:
 
 def _take_outcome(editor: Editor, outcome: Outcome) -> None:
     for one in outcome.proposals:
-        editor.propose(one.scene, one.label, one.key, rest_seconds=one.rest_seconds)
+        if one.scene.camera is editor.shown.camera:
+            editor.propose(one.scene, one.label, one.key, rest_seconds=one.rest_seconds)
+        else:
+            editor.look(one.scene.camera, one.label, one.key, one.rest_seconds)
     if outcome.selection != editor.selection:
         editor.select(outcome.selection)
     editor.change_display(outcome.display)

@@ -53,7 +53,9 @@ class Workspace:
         chosen = from_bar or from_popup
         if chosen is not None:
             editor.attempt(lambda: chosen(editor))
-        status = notices.status_text(editor.frame, editor.control.paused, editor.selection)
+        status = notices.status_text(
+            editor.frame, editor.control.paused, editor.selection, editor.viewing.is_free
+        )
         notices.draw_status_bar(editor.gesture.hint or status)
         area = self._layout.dock(editor.screen.wants_first_layout)
         editor.screen = replace(editor.screen, wants_first_layout=False)
@@ -193,7 +195,9 @@ class Workspace:
         scene = editor.scene
         with widgets.section("Camera") as is_open:
             if is_open:
-                chosen = camera_panel.draw_choice(tuple(scene.cameras), scene.camera_name)
+                chosen = camera_panel.draw_choice(
+                    tuple(scene.cameras), scene.camera_name, editor.viewing.is_free, editor.viewing.is_locked
+                )
                 width, height = scene.settings.size
                 new, wanted = camera_panel.draw(scene.camera, width / height, refusals)
                 if new is not scene.camera:
@@ -303,6 +307,12 @@ def _tell(editor: Editor, refusals: Refusals) -> None:
 
 
 def _apply_camera_outcome(editor: Editor, outcome: camera_panel.Outcome) -> None:
+    if outcome.is_lock:
+        camera.switch_lock(editor)
+    if outcome.is_through:
+        camera.switch_view(editor)
+    if outcome.is_to_view:
+        camera.camera_to_view(editor)
     if outcome.activate is not None:
         camera.activate(editor, outcome.activate)
     if outcome.is_new:

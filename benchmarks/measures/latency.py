@@ -160,13 +160,13 @@ def _held(hand: Hand, field: str) -> Iterator[tuple[Pointer, tuple[float, float]
 def _answer_seconds(app: App, pointer: Pointer, place: tuple[float, float]) -> float:
     """From the motion until a frame is on the screen that shows what moved, or a tile finished after its
     edit."""
-    before = app.editor.scene
+    before = app.editor.shown
     began = time.perf_counter()
     pointer.move(place)
     while time.perf_counter() - began < 30.0:
         app.turn()
         frame = app.shown_frame
-        scene = app.editor.scene
+        scene = app.editor.shown
         if scene is not before and frame is not None and frame.view.scene is scene and _is_updated(frame):
             app.window.context.finish()
             return time.perf_counter() - began

@@ -94,7 +94,7 @@ def _is_incremental(hand: Hand) -> bool:
     frame = hand.app.editor.frame
     return (
         frame is not None
-        and frame.view.scene == hand.app.editor.scene
+        and frame.view.scene == hand.app.editor.shown
         and frame.pictures[-1].mode is Mode.INCREMENTAL
     )
 

@@ -113,7 +113,7 @@ class Soak:
 
     def _is_shown(self) -> bool:
         frame = self.hand.app.editor.frame
-        return frame is not None and frame.view.scene == self.hand.app.editor.scene
+        return frame is not None and frame.view.scene == self.hand.app.editor.shown
 
     def say(self, what: str) -> None:
         """More about the action in the log."""

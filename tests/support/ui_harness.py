@@ -335,6 +335,7 @@ def state(editor: Editor) -> dict[str, Any]:
         **flat(editor.tool, "tool"),
         **flat(editor.control, "control"),
         "is_pinned": editor.rendering.is_pinned,
+        "viewing": editor.viewing,
         "dialog": editor.dialog,
         "is_closing": editor.screen.is_closing,
         "notices": tuple(notice.text for notice in editor.notices.said),

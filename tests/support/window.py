@@ -100,7 +100,7 @@ def is_whole(hand: Hand) -> bool:
 def is_answered(hand: Hand) -> bool:
     """Whether the frame that is there shows the scene that is edited."""
     frame, editor = hand.app.editor.frame, hand.app.editor
-    return frame is not None and frame.view.scene == editor.scene and frame.view.before is None
+    return frame is not None and frame.view.scene == editor.shown and frame.view.before is None
 
 
 def keep(hand: Hand, stage: str) -> npt.NDArray[np.uint8]:

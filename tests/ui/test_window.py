@@ -337,21 +337,25 @@ def test_tiles_far_from_an_edit_keep_their_samples(hand: Hand) -> None:
 # ------------------------------------------------------------------------------------------ camera, display
 
 
-def test_the_middle_button_orbits_and_undo_goes_back(hand: Hand) -> None:
+def test_the_middle_button_orbits_and_the_camera_follows_by_one_edit(hand: Hand) -> None:
     editor = hand.app.editor
     camera = editor.scene.camera
     previews = []
     start, end = hand.in_picture(0.4, 0.5), hand.in_picture(0.6, 0.45)
     hand.drag(start, end, button=2, between=lambda: previews.append(editor.frame.is_preview))
-    turned = editor.scene.camera
+    turned = editor.shown.camera
     distance = np.linalg.norm(np.subtract(camera.position, camera.target))
     assert turned.position != camera.position and turned.target == camera.target
     assert np.linalg.norm(np.subtract(turned.position, turned.target)) == pytest.approx(distance)
     hand.pump(lambda: is_answered(hand) and window.is_whole(hand))
     assert editor.frame.view.scene.camera == turned
+    assert editor.scene.camera == camera and not editor.document.is_dirty, "a free view is no edit"
     keep(hand, "7-orbited")
+    hand.click("menu View")
+    hand.click("Camera to view")
+    assert editor.scene.camera == turned and not editor.viewing.is_free
     hand.key("ctrl+z")
-    assert editor.scene.camera == camera and not editor.document.history.can_undo
+    assert editor.scene.camera == camera == editor.shown.camera and not editor.document.history.can_undo
 
 
 def test_the_split_view_shows_both_strategies_and_its_bar_is_dragged(hand: Hand, file: Path) -> None:

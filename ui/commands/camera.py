@@ -23,13 +23,30 @@ def _frame(editor: Editor, names: tuple[str, ...], label: str) -> None:
     bounds = edits.bounds_of(editor.scene, names)
     if bounds is not None:
         width, height = editor.scene.settings.size
-        camera = camera_moves.frame(editor.scene.camera, bounds, width / height)
-        editor.propose(replace(editor.scene, camera=camera), label)
+        editor.look(camera_moves.frame(editor.shown.camera, bounds, width / height), label)
+
+
+def switch_view(editor: Editor) -> None:
+    """See the scene through its active camera, or from there by the free view that was left last."""
+    editor.viewing = editor.viewing.switched()
+
+
+def camera_to_view(editor: Editor) -> None:
+    """Put the active camera where the free view is."""
+    camera = editor.shown.camera
+    editor.look_through_camera()
+    editor.propose(replace(editor.scene, camera=camera), "Camera to view")
+
+
+def switch_lock(editor: Editor) -> None:
+    """Let moves of the view move the active camera, or no longer."""
+    editor.viewing = replace(editor.viewing, is_locked=not editor.viewing.is_locked)
 
 
 def reset_camera(editor: Editor) -> None:
-    """The active camera as in the file, or in the scene that the document began with; one that was not there
-    gets the view that was active then."""
+    """The active camera as in the file, or in the scene that the document began with, and the view through
+    it; one that was not there gets the view that was active then."""
+    editor.look_through_camera()
     first = editor.document.first_scene
     camera = first.cameras.get(editor.scene.camera_name, first.camera)
     editor.propose(replace(editor.scene, camera=camera), "Reset camera")
@@ -50,7 +67,9 @@ def focus_selected(editor: Editor) -> None:
 
 def new_camera(editor: Editor) -> None:
     """Another camera with the view as it is, through which the scene is seen."""
-    scene, _ = edits.add_camera(editor.scene, editor.scene.camera, editor.scene.camera_name)
+    camera = editor.shown.camera
+    editor.look_through_camera()
+    scene, _ = edits.add_camera(editor.scene, camera, editor.scene.camera_name)
     editor.propose(scene, "New camera")
 
 
@@ -63,6 +82,7 @@ def next_camera(editor: Editor) -> None:
 
 def activate(editor: Editor, name: str) -> None:
     """See the scene through a camera."""
+    editor.look_through_camera()
     editor.propose(editor.scene.with_active_camera(name), f"Camera {name}")
 
 
@@ -83,5 +103,4 @@ def rename_camera(editor: Editor) -> None:
 
 def look_from(editor: Editor, side: str) -> None:
     """Look along an axis at the same target."""
-    camera = camera_moves.set_view(editor.scene.camera, side)
-    editor.propose(replace(editor.scene, camera=camera), f"Look from {side}")
+    editor.look(camera_moves.set_view(editor.shown.camera, side), f"Look from {side}")

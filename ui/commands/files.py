@@ -84,7 +84,8 @@ def save_to(editor: Editor, path: Path) -> None:
     """Write the scene file there, and say so."""
     written = editor.document.save(path)
     editor.preferences = editor.preferences.with_recent(written)
-    editor.say(f"{written} is saved", "done")
+    told = "; this view is no part of it, unless View › Camera to view" if editor.viewing.is_free else ""
+    editor.say(f"{written} is saved{told}", "done")
 
 
 def import_mesh(editor: Editor) -> None:
@@ -149,7 +150,7 @@ def drop(editor: Editor, path: Path, slot: TextureSlot | None = None) -> None:
         open_file(editor, path)
         return
     with collected_warnings() as warnings:
-        scene, names = insert.drop_file(editor.scene, path)
+        scene, names = insert.drop_file(editor.shown, path)
     for warning in warnings:
         editor.say(warning, "warning")
     selection = Selection(names) if names else editor.selection

@@ -30,13 +30,13 @@ def cancel(editor: Editor) -> None:
 
 def add_shape(editor: Editor, shape: str) -> None:
     """A new object of that shape, selected."""
-    scene, names = edits.add_shape(editor.scene, shape)
+    scene, names = edits.add_shape(editor.shown, shape)
     editor.propose(scene, f"Add {shape}", selection=Selection(names))
 
 
 def add_light(editor: Editor, kind: str) -> None:
     """A new light of that kind, selected."""
-    scene, names = edits.add_light(editor.scene, kind)
+    scene, names = edits.add_light(editor.shown, kind)
     editor.propose(scene, f"Add {edits.LIGHT_NAMES[kind]}", selection=Selection(names))
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from incpt.core.errors import DeviceError, InputError, OutputError, one_line
 from incpt.picture import denoise
 from incpt.scene import edits
+from incpt.scene.camera import Camera
 from incpt.scene.edits import Copied
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
@@ -24,6 +25,7 @@ from incpt.ui.editor.dialog import Answer, Dialog
 from incpt.ui.editor.document import Document
 from incpt.ui.editor.notices import Notices
 from incpt.ui.editor.state import Beginning, Control, Gesture, Rendering, Screen, Tool
+from incpt.ui.editor.viewing import ShownScenes, Viewing
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
 from incpt.viewer.renderer import Exported, Message, Pick, Picked, PickedBox, Problem, Renderer, Restart
 from incpt.viewer.view import Frame, View
@@ -60,6 +62,10 @@ class Editor:
         self.screen = Screen()
         self.notices = Notices()
         self.dialog: Dialog | None = None
+        self.viewing = Viewing()
+        self._before_move: Viewing | None = None
+        """Where the view was before the move of it that is under way."""
+        self._shown = ShownScenes()
 
     # ---------------------------------------------------------------------------------- the scene
 
@@ -67,6 +73,11 @@ class Editor:
     def scene(self) -> Scene:
         """The scene as it is edited now."""
         return self.document.history.scene
+
+    @property
+    def shown(self) -> Scene:
+        """The same scene as it is looked at; see `viewing`. What is made of it can be proposed as well."""
+        return self._shown.of(self.scene, self.viewing.camera)
 
     def propose(
         self,
@@ -78,8 +89,11 @@ class Editor:
         rest_seconds: float = 0.0,
     ) -> None:
         """Make `scene` the current one. Proposals under one `key` are one entry of the history until a frame
-        ends in which nothing is held; `rest_seconds` keeps the entry open that long (turns of a wheel)."""
-        if scene is self.scene:
+        ends in which nothing is held; `rest_seconds` keeps the entry open that long (turns of a wheel). A
+        change of the active camera is seen: the view goes back to it."""
+        old = self.scene
+        scene = self._shown.edited(scene, self.viewing.camera, old.camera)
+        if scene is old:
             return
         after = self.selection if selection is None else selection
         self.document.history.propose(
@@ -87,6 +101,29 @@ class Editor:
         )
         self.selection = after.within(scene)
         self.gesture = replace(self.gesture, rest_until=self.now() + rest_seconds)
+        self._follow_camera(old)
+
+    def look(self, camera: Camera, label: str, key: str | None = None, rest_seconds: float = 0.0) -> None:
+        """Look at the scene by another camera. This is no edit, unless the view is locked to the active
+        camera; `label`, `key` and `rest_seconds` are those of `propose`."""
+        if camera == self.shown.camera:
+            return
+        if self.viewing.is_locked and not self.viewing.is_free:
+            scene = replace(self.scene, camera=camera)
+            self.propose(scene, label, key, rest_seconds=rest_seconds)
+            return
+        if key is not None and self._before_move is None:
+            self._before_move = self.viewing
+        self.viewing = self.viewing.moved(camera)
+        self.gesture = replace(self.gesture, rest_until=self.now() + rest_seconds)
+
+    def look_through_camera(self) -> None:
+        """See the scene through its active camera."""
+        self.viewing = self.viewing.through_camera()
+
+    def _follow_camera(self, old: Scene) -> None:
+        if self.scene.camera != old.camera:
+            self.look_through_camera()
 
     def attempt(self, action: Callable[[], object]) -> bool:
         """Run `action`; what it refuses becomes a notice, and everything stays as it was."""
@@ -119,17 +156,23 @@ class Editor:
     def undo(self) -> None:
         """Take back the last edit; a drag under way is given up."""
         self._end_drag()
+        old = self.scene
         self._restore_selection(self.document.history.undo())
+        self._follow_camera(old)
 
     def redo(self) -> None:
         """Do again what was taken back; a drag under way is ended."""
         self._end_drag()
+        old = self.scene
         self._restore_selection(self.document.history.redo())
+        self._follow_camera(old)
 
     def cancel_drag(self) -> bool:
         """Give up the drag under way; returns whether there was one."""
-        if self.document.history.before is None:
+        if not self._is_dragging:
             return False
+        if self._before_move is not None:
+            self.viewing = self._before_move
         self._end_drag()
         self.document.history.cancel()
         return True
@@ -159,8 +202,14 @@ class Editor:
         self.screen = replace(self.screen, wanted_menu=name)
 
     def _end_drag(self) -> None:
-        if self.document.history.before is not None:
+        if self._is_dragging:
             self.gesture = replace(self.gesture, is_cancelled=True)
+        self._before_move = None
+
+    @property
+    def _is_dragging(self) -> bool:
+        """Whether an entry of the history is open, or the view is being moved."""
+        return self.document.history.before is not None or self._before_move is not None
 
     def _restore_selection(self, names: tuple[str, ...] | None) -> None:
         if names is not None:
@@ -178,8 +227,8 @@ class Editor:
         """What the renderer is to show."""
         display = self.preferences.display
         return View(
-            scene=self.scene,
-            before=self.document.history.before,
+            scene=self.shown,
+            before=self._shown_before,
             point=self.control.point,
             resolution_scale=self.preferences.resolution_scale,
             paused=self.control.paused,
@@ -190,6 +239,14 @@ class Editor:
             first_hits=display.overlay in NEEDS_FIRST_HITS,
             denoise=display.denoise and denoise.is_available(),
         )
+
+    @property
+    def _shown_before(self) -> Scene | None:
+        """The scene before what is dragged, as it was shown; None: nothing is."""
+        if self._before_move is not None:
+            return self._shown.of(self.scene, self._before_move.camera)
+        before = self.document.history.before
+        return None if before is None else self._shown.of(before, self.viewing.camera)
 
     def resize_viewport(self, size: tuple[int, int] | None) -> None:
         """The panels leave so many pixels for the picture; None where that is too little for one."""
@@ -268,22 +325,24 @@ class Editor:
         transform is under way, `hint` what keys do then (see Gesture)."""
         if not is_held and self.now() >= self.gesture.rest_until:
             self.document.history.settle()
+            self._before_move = None
         self.gesture = Gesture(is_held, is_flying, self.gesture.rest_until, hint=hint)
         self.selection = self.selection.within(self.scene)
         self.renderer.show(self.view)
 
     @property
     def is_waiting(self) -> bool:
-        """Whether a frame is due soon without an event: the camera flies, or an entry of the history waits
-        for a rest."""
-        is_open = self.document.history.before is not None
-        return self.gesture.is_flying or (is_open and not self.gesture.is_held)
+        """Whether a frame is due soon without an event: the camera flies, or an entry of the history, or a
+        move of the view, waits for a rest."""
+        return self.gesture.is_flying or (self._is_dragging and not self.gesture.is_held)
 
     # --------------------------------------------------------------------------------------- files
 
     def start_over(self, document: Document, opened: Path | None = None) -> None:
         """Edit another document from now on."""
         self.document = document
+        self.viewing = Viewing(is_locked=self.viewing.is_locked)
+        self._before_move = None
         self.select(Selection())
         self.control = replace(self.control, point=None)
         for warning in document.warnings:

@@ -27,18 +27,29 @@ class CameraRequest:
 @dataclass(frozen=True)
 class Outcome:
     """What the user asked for about the cameras of the scene: see through another, make, rename or delete
-    one."""
+    one; see through the active one, put it where the free view is, lock it to the view or no longer."""
 
     activate: str | None = None
     is_new: bool = False
     is_rename: bool = False
     is_delete: bool = False
+    is_through: bool = False
+    is_to_view: bool = False
+    is_lock: bool = False
 
 
-def draw_choice(names: tuple[str, ...], active: str) -> Outcome:
-    """The camera that the scene is seen through, and buttons for others."""
+def draw_choice(names: tuple[str, ...], active: str, is_free: bool, is_locked: bool) -> Outcome:
+    """The camera that the scene is rendered through, and buttons for others. `is_free`: the view is beside
+    it; `is_locked`: moves of the view move it."""
     options = [(name, name) for name in names]
-    chosen = widgets.choice("Active camera", active, options, "The scene is seen through it")
+    chosen = widgets.choice("Active camera", active, options, "The scene is rendered through it")
+    with widgets.row("Free view" if is_free else "Seen through it", "Moving a free view is no edit"):
+        is_through = widgets.button("Look through##camera", "As it will be rendered", enabled=is_free)
+        widgets.same_line()
+        is_to_view = widgets.button(
+            "Camera to view##camera", "Put it where the free view is", enabled=is_free
+        )
+    lock = widgets.checkbox("Lock to view", is_locked, "Moves of the view through it move it, as edits")
     with widgets.row("", ""):
         is_new = widgets.button("New from view##camera", "Another camera with the view as it is")
     with widgets.row("", ""):
@@ -47,7 +58,10 @@ def draw_choice(names: tuple[str, ...], active: str) -> Outcome:
         is_delete = widgets.button(
             "Delete##camera", "The scene is seen through the first of the others", enabled=len(names) > 1
         )
-    return Outcome(chosen if chosen != active else None, is_new, is_rename, is_delete)
+    return Outcome(
+        chosen if chosen != active else None, is_new, is_rename, is_delete, is_through, is_to_view,
+        lock != is_locked,
+    )  # fmt: skip
 
 
 def draw(camera: Camera, aspect: float, refusals: Refusals) -> tuple[Camera, CameraRequest]:

@@ -41,10 +41,12 @@ def draw_status_bar(text: str) -> None:
     imgui.end()
 
 
-def status_text(frame: Frame | None, is_paused: bool, selection: Selection) -> str:
-    """Mode or how much of an edit is found, samples, selection: what one looks for without opening a
-    panel."""
-    parts = []
+def status_text(
+    frame: Frame | None, is_paused: bool, selection: Selection, is_free_view: bool = False
+) -> str:
+    """Whether the view is a free one, mode or how much of an edit is found, samples, selection: what one
+    looks for without opening a panel."""
+    parts = ["Free view"] if is_free_view else []
     if frame is not None:
         picture = frame.pictures[-1]
         found = found_text(picture)

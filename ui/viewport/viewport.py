@@ -37,7 +37,8 @@ _LEAST_PIXELS = 16
 
 @dataclass(frozen=True)
 class Proposal:
-    """A scene to take the place of the one before it; the fields are the arguments of `Editor.propose`."""
+    """A scene to take the place of the one before it; the fields are the arguments of `Editor.propose`. One
+    with another camera is a move of the view."""
 
     scene: Scene
     label: str

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
@@ -112,15 +113,25 @@ NEEDS_SELECTION = {
 NEEDS_PICTURE = {"Export picture…", "Copy picture", "Pin reference"}
 NEEDS_CAMERAS = {"Next camera"}
 NEEDS_LOSS = "Find missing files…"
+NEEDS_VIEW = {"Through the camera", "Camera to view"}
 
 
 def test_what_is_disabled(user: Desk) -> None:
     disabled = {one.name for one in COMMANDS if not one.is_enabled(user.editor)}
-    assert disabled == NEEDS_SELECTION | NEEDS_PICTURE | NEEDS_CAMERAS | {"Undo", "Redo", "Paste", NEEDS_LOSS}
+    assert disabled == NEEDS_SELECTION | NEEDS_PICTURE | NEEDS_CAMERAS | NEEDS_VIEW | {
+        "Undo",
+        "Redo",
+        "Paste",
+        NEEDS_LOSS,
+    }
     user.editor.select(Selection(("lamp",)))
     user.run("Delete")
     disabled = {one.name for one in COMMANDS if not one.is_enabled(user.editor)}
-    assert disabled == NEEDS_SELECTION | NEEDS_PICTURE | NEEDS_CAMERAS | {"Redo", "Paste", NEEDS_LOSS}
+    assert disabled == NEEDS_SELECTION | NEEDS_PICTURE | NEEDS_CAMERAS | NEEDS_VIEW | {
+        "Redo",
+        "Paste",
+        NEEDS_LOSS,
+    }
 
 
 def test_keys_are_shown_as_they_are_printed() -> None:
@@ -273,7 +284,8 @@ CHANGES: dict[str, set[str]] = {
     "Clear scale": set(),
     "Clear all three": {"scene.objects.red cube.position.1", "scene.objects.red cube.rotation.1"},
     "Copy": set(),
-    "Front": {"scene.camera.position.1", "scene.camera.position.2"},
+    "Front": {"viewing"},
+    "Lock camera to view": {"viewing"},
     "Split view": {"preferences.display.split"},
     "Tile grid": {"preferences.display.tile_grid"},
     "Outline": {"preferences.display.outline"},
@@ -360,17 +372,19 @@ def test_one_part_of_each_transform_is_cleared(user: Desk, keys: str, part: str)
 def test_the_camera_is_framed_and_reset(user: Desk) -> None:
     user.editor.select(Selection(("glass ball",)))
     user.run("Frame selected")
-    assert user.scene.camera.target == pytest.approx((1.1, 0.5, 0.3))
-    assert changes(flat(MIXED), flat(user.scene)) <= {
+    closer = user.editor.shown.camera
+    assert closer.target == pytest.approx((1.1, 0.5, 0.3)) and user.scene == MIXED
+    assert changes(flat(MIXED), flat(user.editor.shown)) <= {
         f"camera.{what}.{i}" for what in ("position", "target") for i in range(3)
     }
-    closer = user.scene.camera
     user.key("Home")
-    assert np.linalg.norm(
-        np.subtract(user.scene.camera.position, user.scene.camera.target)
-    ) > 2 * np.linalg.norm(np.subtract(closer.position, closer.target))
+    farther = user.editor.shown.camera
+    assert math.dist(farther.position, farther.target) > 2 * math.dist(closer.position, closer.target)
+    user.run("Camera to view")
+    assert user.scene.camera == farther and not user.editor.viewing.is_free and user.undo_count == 1
+    user.key("Home")
     user.run("Reset camera")
-    assert user.scene == MIXED
+    assert user.scene == MIXED and user.editor.shown is user.scene
 
 
 def test_match_window_takes_the_size_of_the_viewport(user: Desk) -> None:
@@ -395,8 +409,8 @@ def test_fly_keys_are_no_commands_while_flying(user: Desk) -> None:
         user.frames(3)
     user.key("A")
     changed = changes(before, state(user.editor))
-    assert changed and all(place.startswith("scene.camera") for place in changed)
+    assert changed == {"viewing"}
     user.key("Escape")
-    assert not user.editor.gesture.is_flying and user.undo_count == 1
+    assert not user.editor.gesture.is_flying and user.undo_count == 0
     assert {key.key.upper() for key in bindings.FLY_KEYS} & {one.keys for one in COMMANDS}  # they would clash
     assert bindings.action_for("blender", Button.GRAVE, ["shift"]) is MouseAction.FLY

@@ -357,7 +357,7 @@ def test_undo_and_redo_lead_through_the_same_scenes(sequence: list[tuple[str, An
             elif kind not in ("undo", "redo"):
                 assert history.can_redo == could_redo
             assert all(name in user.scene.object_index for name in user.editor.selection)
-            assert user.null.views[-1].scene == user.scene
+            assert user.null.views[-1].scene == user.editor.shown
         scenes = [user.scene]
         while history.can_undo:
             command.run(user.editor, table.command("Undo"))

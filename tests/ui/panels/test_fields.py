@@ -218,7 +218,8 @@ ELSEWHERE = {
     "Frame selected##camera", "Reset##camera", "Pin this picture", "Remove##normal_texture",
     "Remove##clearcoat_normal_texture", "Active camera", "New from view##camera",
     "Rename…##camera", "Delete##camera", "Lens", "Sensor fit", "Projection", "Depth of field",
-    "Focus on selected##camera", "Sky", "Sun disc",
+    "Focus on selected##camera", "Sky", "Sun disc", "Look through##camera", "Camera to view##camera",
+    "Lock to view",
 }  # fmt: skip
 """Tested below, one by one."""
 
@@ -631,10 +632,17 @@ def test_a_material_is_renamed(user: Desk) -> None:
 def test_camera_buttons(user: Desk) -> None:
     turn_to(user, "Scene")
     user.click("Frame selected##camera")
-    assert user.scene.camera != SCENE.camera and user.scene.camera.target == pytest.approx((0, 0.5, 0))
+    assert user.editor.shown.camera.target == pytest.approx((0, 0.5, 0)) and user.scene is SCENE
+    user.click("Look through##camera")
+    assert user.editor.shown is SCENE
+    user.click("Frame selected##camera")
+    user.click("Camera to view##camera")
+    assert user.scene.camera.target == pytest.approx((0, 0.5, 0)) and not user.editor.viewing.is_free
     user.type("Field of view", "70")
     user.click("Reset##camera")
     assert user.scene == SCENE and user.undo_count == 3
+    user.click("Lock to view")
+    assert user.editor.viewing.is_locked and user.undo_count == 3
 
 
 def test_a_number_that_no_widget_offers_stays(user: Desk) -> None:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from support.small_scenes import mixed_scene
 from support.ui_harness import Desk, changes, desk, flat, state, tell
 
+from incpt.scene.camera import Camera
 from incpt.scene.light import Light
 from incpt.scene.selection import Selection
 from incpt.ui.preferences import SnapSettings
@@ -166,6 +168,16 @@ def test_a_pick_of_what_is_gone_selects_nothing(user: Desk) -> None:
     assert user.editor.selection.names == ("lamp",)
 
 
+def told(labels: list[str], look: Callable[..., None]) -> Callable[..., None]:
+    """`look`, with its labels noted."""
+
+    def note(camera: Camera, label: str, *arguments: Any) -> None:
+        labels.append(label)
+        look(camera, label, *arguments)
+
+    return note
+
+
 @pytest.mark.parametrize(
     ("navigation", "button", "modifiers", "label"),
     [
@@ -181,8 +193,10 @@ def test_a_pick_of_what_is_gone_selects_nothing(user: Desk) -> None:
     ],
 )
 def test_a_drag_moves_the_camera(
-    user: Desk, navigation: str, button: int, modifiers: str, label: str
+    user: Desk, navigation: str, button: int, modifiers: str, label: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    labels: list[str] = []
+    monkeypatch.setattr(user.editor, "look", told(labels, user.editor.look))
     user.editor.choose_navigation(navigation)
     start = user.at_picture(0.2, 0.2)
     if modifiers:
@@ -191,12 +205,20 @@ def test_a_drag_moves_the_camera(
     else:
         user.drag_at(start, (60.0, 40.0), button=button)
     user.frames(2)
+    changed = changes(flat(SCENE), flat(user.editor.shown))
+    assert changed and all(place.startswith("camera.") for place in changed)
+    assert user.scene is SCENE and user.null.views[-1].scene is user.editor.shown and set(labels) == {label}
+    assert not user.null.requests and not user.editor.gesture.is_flying
+
+
+def test_a_view_that_is_locked_moves_the_camera_as_one_edit(user: Desk) -> None:
+    user.run("Lock camera to view")
+    user.drag_at(user.at_picture(0.2, 0.2), (60.0, 40.0), button=2)
     changed = changes(flat(SCENE), flat(user.scene))
     assert changed and all(place.startswith("camera.") for place in changed)
-    assert user.editor.document.history.undo_label == label and user.undo_count == 1
-    assert not user.null.requests and not user.editor.gesture.is_flying
+    assert user.editor.document.history.undo_label == "Orbit" and user.undo_count == 1
     user.key("Ctrl+Z")
-    assert user.scene == SCENE
+    assert user.scene == SCENE and not user.editor.viewing.is_free
 
 
 def test_a_drag_with_the_selecting_button_alone_does_nothing_in_blenders_set(user: Desk) -> None:
@@ -208,26 +230,41 @@ def test_a_camera_drag_is_given_up_by_escape(user: Desk) -> None:
     x, y = user.at_picture(0.2, 0.2)
     user.editor.select(Selection(("lamp",)))
     user.hold_at((x, y), (60.0, 40.0), button=2)
-    assert user.scene != SCENE and user.editor.view.before is SCENE
+    assert user.editor.viewing.is_free and user.editor.view.before is SCENE
     user.key("Escape")
     user.move(x + 100, y)
     user.release(2)
     user.frames(2)
-    assert user.scene == SCENE and user.undo_count == 0 and user.editor.selection.names == ("lamp",)
+    assert (
+        user.editor.shown is SCENE
+        and not user.editor.viewing.is_free
+        and user.editor.selection.names == ("lamp",)
+    )
 
 
 def test_a_mouse_that_leaves_the_window_turns_no_camera_that_flies(user: Desk) -> None:
     user.move(*user.at_picture(0.2, 0.2))
     user.key("Shift+Grave_accent")
     user.move(*user.at_picture(0.25, 0.2))
-    camera = user.scene.camera
+    camera = user.editor.shown.camera
     assert camera != SCENE.camera
     user.move(-FLT_MAX, -FLT_MAX)  # what imgui is told then
-    assert user.scene.camera == camera and user.editor.gesture.is_flying
+    assert user.editor.shown.camera == camera and user.editor.gesture.is_flying
     user.key("Escape")
 
 
-def test_turns_of_the_wheel_are_one_entry_until_they_rest(user: Desk) -> None:
+def test_turns_of_the_wheel_are_one_move_until_they_rest(user: Desk) -> None:
+    user.move(*user.at_picture(0.2, 0.2))
+    for _ in range(3):
+        user.wheel(1.0)
+        user.frames(3)
+    assert user.editor.is_waiting and user.editor.view.before is SCENE
+    user.rest(1.0)
+    assert not user.editor.is_waiting and user.editor.view.before is None and user.scene is SCENE
+
+
+def test_turns_of_the_wheel_are_one_entry_where_the_view_is_locked(user: Desk) -> None:
+    user.run("Lock camera to view")
     user.move(*user.at_picture(0.2, 0.2))
     for _ in range(3):
         user.wheel(1.0)
@@ -345,9 +382,10 @@ def test_the_camera_moves_with_the_gizmo_under_the_mouse(user: Desk) -> None:
     assert user.viewport.gizmo.is_over
     user.wheel(1.0)
     user.rest(1.0)
-    assert user.editor.document.history.undo_label == "Zoom"
+    zoomed = user.editor.viewing.camera
+    assert zoomed is not None and zoomed != SCENE.camera
     user.drag_at((x, y), (60.0, 0.0), button=2)
-    assert user.editor.document.history.undo_label == "Orbit" and user.undo_count == 2
+    assert user.editor.viewing.camera != zoomed and user.scene is SCENE
 
 
 def test_the_bar_of_the_split_view_is_dragged(user: Desk) -> None:

@@ -1,0 +1,81 @@
+"""From where the scene is looked at in the window: through its active camera, or freely beside it.
+
+A free view is no part of the scene: moving it is no edit, and saving does not keep it. What is shown is a
+scene all the same, the edited one with the view's camera in place of the active one, so that the renderer,
+handles and marks need to know of one camera only.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass, replace
+
+from incpt.scene.camera import Camera
+from incpt.scene.model import Scene
+
+_MOST_KNOWN = 8
+"""How many shown scenes are kept: the one before a drag, and those of the frames around the present one."""
+
+
+@dataclass(frozen=True)
+class Viewing:
+    """camera      that of a free view; None: the scene is seen through its active camera.
+    left        the free view that was left last, to which `switched` goes back.
+    is_locked   whether moves of the view through the active camera move that camera, which are edits then.
+    """
+
+    camera: Camera | None = None
+    left: Camera | None = None
+    is_locked: bool = False
+
+    @property
+    def is_free(self) -> bool:
+        return self.camera is not None
+
+    def moved(self, camera: Camera) -> Viewing:
+        """Free, with that camera."""
+        return replace(self, camera=camera)
+
+    def through_camera(self) -> Viewing:
+        """Through the active camera of the scene."""
+        return self if self.camera is None else replace(self, camera=None, left=self.camera)
+
+    def switched(self) -> Viewing:
+        """From the free view to the camera, or back to the free view that was left."""
+        return self.through_camera() if self.is_free else replace(self, camera=self.left)
+
+
+class ShownScenes:
+    """Edited scenes as they are shown, and back. The same scene and camera give the very same shown scene,
+    so that nobody takes it for an edit."""
+
+    def __init__(self) -> None:
+        self._known: OrderedDict[tuple[int, int], tuple[Scene, Camera, Scene]] = OrderedDict()
+
+    def of(self, scene: Scene, camera: Camera | None) -> Scene:
+        """`scene` as it is shown by a view's camera, or through its own (None)."""
+        if camera is None:
+            return scene
+        key = (id(scene), id(camera))
+        if key not in self._known:
+            self._keep(scene, camera, replace(scene, camera=camera))
+        self._known.move_to_end(key)
+        return self._known[key][2]
+
+    def edited(self, shown: Scene, camera: Camera | None, own: Camera) -> Scene:
+        """The edited scene of one that was made from a shown scene: with `own`, its own active camera, in
+        place of the view's. A scene that was made with another camera is an edited one already."""
+        if camera is None or shown.camera is not camera:
+            return shown
+        for scene, _, known in self._known.values():
+            if known is shown:
+                return scene
+        scene = replace(shown, camera=own)
+        self._keep(scene, camera, shown)
+        return scene
+
+    def _keep(self, scene: Scene, camera: Camera, shown: Scene) -> None:
+        # What is kept holds the scene and the camera, so no other can have their ids.
+        self._known[id(scene), id(camera)] = (scene, camera, shown)
+        while len(self._known) > _MOST_KNOWN:
+            self._known.popitem(last=False)
