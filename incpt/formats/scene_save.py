@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 import re
+import tomllib
+from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -14,7 +17,8 @@ from incpt.core import files
 from incpt.core.checks import path_of, require
 from incpt.core.errors import InputError, one_line
 from incpt.core.layout import TextureSlot
-from incpt.formats import bitmaps, images, import_report, mesh_files, mesh_store
+from incpt.core.settings import RenderSettings
+from incpt.formats import bitmaps, images, import_report, mesh_files, mesh_store, toml_merge
 from incpt.formats.scene_toml import VERSION
 from incpt.formats.textures import texture_value
 from incpt.scene.camera import Camera
@@ -26,12 +30,16 @@ from incpt.scene.mesh import Mesh, MeshSource
 from incpt.scene.mesh_part import MeshFile
 from incpt.scene.model import CAMERA_NAME, Object, Scene
 from incpt.scene.shapes import shape
+from incpt.scene.sky import Sky
 from incpt.scene.texture import Bitmap, Texture
-from incpt.scene.transform import Transform
+from incpt.scene.transform import IDENTITY, Transform
 
 
-def save(scene: Scene, path: str | os.PathLike[str]) -> None:
+def save(scene: Scene, path: str | os.PathLike[str], *, template: str | None = None) -> None:
     """Writes a scene file, atomically; `load` gives an equal scene back.
+
+    `template` is the text of a scene file whose comments, order and spelling are kept, as far as it says the
+    same: that which the scene came from.
 
     Meshes and images that came from files are named relative to the new file. A mesh or image made or
     changed in Python is written beside the scene file under a name with a digest of its content. Raises
@@ -39,17 +47,20 @@ def save(scene: Scene, path: str | os.PathLike[str]) -> None:
     that no file can hold.
     """
     require("scene", scene, Scene, "a Scene")
+    require("template", template, (str, NoneType), "the text of a scene file")
     path = path_of("path", path)
     if path.suffix.lower() != ".toml":
         raise InputError(f"{path}: a scene is saved as TOML; end its name with .toml")
-    write_scene(scene, path, Beside(path))
+    write_scene(scene, path, Beside(path), template)
 
 
-def write_scene(scene: Scene, path: Path, beside: Beside) -> None:
-    """Writes a scene file, whose meshes and images `beside` finds or writes. Raises OutputError, InputError;
-    then nothing is left behind."""
+def write_scene(scene: Scene, path: Path, beside: Beside, template: str | None = None) -> None:
+    """Writes a scene file, whose meshes and images `beside` finds or writes; `template` as for `save`. Raises
+    OutputError, InputError; then nothing is left behind."""
     try:
         document = _document(scene, beside)
+        if template is not None:
+            document = toml_merge.merged(template, tomllib.loads(document), _defaults) or document
         files.write_bytes(path, document.encode())
     except UnicodeEncodeError:
         beside.undo()
@@ -215,6 +226,38 @@ def _document(scene: Scene, beside: Beside) -> str:
         raise InputError(
             one_line(f"scene: cannot be written as TOML ({error}); rename what is odd")
         ) from None
+
+
+def _defaults(path: tuple[str, ...], table: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The values that the keys of a table of a scene file have where they are missing."""
+    match path:
+        case ("camera",) | ("cameras", _):
+            return _usual(Camera())
+        case ("environment",):
+            is_picture = "image" in table or "sky" in table
+            return {**_usual(Environment()), "color": [1.0, 1.0, 1.0] if is_picture else [0.0, 0.0, 0.0]}
+        case ("environment", "sky"):
+            return _usual(Sky())
+        case ("render",):
+            return _usual(RenderSettings())
+        case ("materials", _):
+            return _usual(Material())
+        case ("lights",):
+            own = _usual(Light("light", table.get("kind", "point")))
+            own = {key: value for key, value in own.items() if key not in (*STRENGTHS, "name", "kind")}
+            return {**own, **_usual_placement(table)}
+        case ("objects",):
+            return {**_usual_placement(table), "visible": True}
+    return {}
+
+
+def _usual(owner: Any) -> dict[str, Any]:
+    values = {field.name: getattr(owner, field.name) for field in fields(owner)}
+    return {k: _toml(v) for k, v in values.items() if isinstance(v, (bool, int, float, str, tuple))}
+
+
+def _usual_placement(table: Mapping[str, Any]) -> dict[str, Any]:
+    return {} if "matrix" in table else _placement(IDENTITY)
 
 
 def _camera_tables(scene: Scene) -> dict[str, Any]:

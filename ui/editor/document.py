@@ -29,7 +29,7 @@ UNTITLED = "untitled"
 class Document:
     """A scene under edit. `path` is its scene file, or None while it has none; `warnings` are what came up
     while it was read, a line each, and `report` is what became of its files; `first_scene` is what it began
-    with."""
+    with. `text` is that of the scene file, whose comments are kept when it is saved."""
 
     def __init__(
         self,
@@ -40,6 +40,7 @@ class Document:
         warnings: tuple[str, ...] = (),
         report: ImportReport = NOTHING_TOLD,
         is_saved: bool = True,
+        text: str | None = None,
     ) -> None:
         self.history = History(scene)
         self.path = path
@@ -47,6 +48,7 @@ class Document:
         self.report = report
         self.first_scene = scene
         self._name = name
+        self._text = text
         self._saved: Scene | None = scene if is_saved else None
 
     @classmethod
@@ -67,16 +69,18 @@ class Document:
         return cls(scene, warnings=tuple(messages))
 
     @classmethod
-    def open(cls, path: str | os.PathLike[str], **options: Any) -> Document:
+    def open(cls, file: str | os.PathLike[str], **options: Any) -> Document:
         """A document from a scene file, or an untitled one of a file that is not saved to: a mesh, or a scene
         of another renderer. `options` are those of `registry.load_with_report`; placeholders stand for meshes
         and images of a scene file that cannot be read. Raises InputError."""
-        absolute = absolute_path(path)
+        absolute = absolute_path(file)
         scene, report = registry.load_with_report(absolute, allow_missing=True, **options)
         warnings = tuple(map(one_line, registry.complaints(absolute, scene, report)))
         is_scene = absolute.suffix.lower() == SUFFIX
         name = absolute.name if is_scene else absolute.stem
-        return cls(scene, absolute if is_scene else None, name=name, warnings=warnings, report=report)
+        text = scene_text(absolute) if is_scene else None
+        path = absolute if is_scene else None
+        return cls(scene, path, name=name, warnings=warnings, report=report, text=text)
 
     @property
     def scene(self) -> Scene:
@@ -102,16 +106,18 @@ class Document:
         """Writes the scene to a scene file, atomically; it is the document's own from then on. Returns its
         absolute path.
 
-        ".toml" is added to a name without a suffix. A mesh or image that exists only in memory is written
-        beside it. Raises InputError (another suffix, a scene that no file can hold) and OutputError (the
-        system refuses); then file and dirty mark stay as they were.
+        Comments of the scene file that it came from stay. ".toml" is added to a name without a suffix. A mesh
+        or image that exists only in memory is written beside it. Raises InputError (another suffix, a scene
+        that no file can hold) and OutputError (the system refuses); then file and dirty mark stay as they
+        were.
         """
         self.history.settle()
         absolute = scene_path(path)
         scene = self.scene
-        scene_save.save(scene, absolute)
+        scene_save.save(scene, absolute, template=self._text)
         self.path = absolute
         self._saved = scene
+        self._text = scene_text(absolute)
         return absolute
 
 
@@ -129,6 +135,14 @@ def new_scene() -> Scene:
             Object("cube", shape("cube"), "orange", position=(0.0, 0.5, 0.0), rotation=(0.0, 20.0, 0.0)),
         ),
     )
+
+
+def scene_text(path: Path) -> str | None:
+    """The text of a scene file; None where there is none that can be read."""
+    try:
+        return path.read_text("utf-8-sig")
+    except (OSError, UnicodeDecodeError):
+        return None
 
 
 def scene_path(path: str | os.PathLike[str]) -> Path:

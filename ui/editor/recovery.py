@@ -24,7 +24,7 @@ from incpt.core import files
 from incpt.core.errors import InputError, OutputError, one_line
 from incpt.formats import registry, scene_save
 from incpt.scene.model import Scene
-from incpt.ui.editor.document import UNTITLED, Document, collected_warnings
+from incpt.ui.editor.document import UNTITLED, Document, collected_warnings, scene_text
 from incpt.ui.preferences import CONFIG_DIR
 
 _ORIGINAL = "# original: "
@@ -57,7 +57,9 @@ class LeftBehind:
         are gone since. The file stays. Raises InputError."""
         with collected_warnings() as messages:
             scene = registry.load(self.path, allow_missing=True)
-        return Document(scene, self.original, name=self.name, warnings=tuple(messages), is_saved=False)
+        text = None if self.original is None else scene_text(self.original)
+        warnings = tuple(messages)
+        return Document(scene, self.original, name=self.name, warnings=warnings, is_saved=False, text=text)
 
     def remove(self) -> None:
         """Removes the recovery file and what was written beside it: nobody wants it."""

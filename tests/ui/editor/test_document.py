@@ -142,3 +142,23 @@ def test_the_new_scene_shows_its_cube_on_the_floor() -> None:
     assert diff(Scene(), scene).added == {"floor", "cube"}
     assert scene.object("cube").world_bounds[0][1] == pytest.approx(0)
     assert os.path.basename(scene_path("a")) == "a.toml"
+
+
+def test_saving_keeps_what_a_person_wrote(tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text(
+        "# mine\nversion = 2\n[environment]\ncolor = [1, 1, 1] # white\n[materials.red]\n"
+        '[[objects]]\nname = "cube" # the die\nshape = "cube"\nmaterial = "red"\n'
+    )
+    text = path.read_text()
+    document = Document.open(path)
+    document.save(path)
+    assert path.read_text() == text
+    document.history.propose(document.scene.with_environment(intensity=0.25), "Environment")
+    document.save(tmp_path / "b.toml")
+    saved = (tmp_path / "b.toml").read_text()
+    assert saved == text.replace("# white\n", "# white\nintensity = 0.25\n")
+    document.history.propose(document.scene.with_object("cube", position=(1, 2, 3)), "Move")
+    document.save(tmp_path / "b.toml")
+    assert "# the die" in (tmp_path / "b.toml").read_text() and "# mine" in (tmp_path / "b.toml").read_text()
+    assert Document.open(tmp_path / "b.toml").scene == document.scene
