@@ -13,7 +13,7 @@ from incpt.render.strategies import strategy_of
 from incpt.scene import edits, several
 from incpt.scene.light import Light
 from incpt.scene.model import Object, Placed
-from incpt.ui.commands import camera, command, files, materials, menus, objects, rendering
+from incpt.ui.commands import camera, command, files, materials, menus, objects, pictures, rendering
 from incpt.ui.editor.editor import Editor
 from incpt.ui.editor.records import Records
 from incpt.ui.layout import Layout
@@ -256,8 +256,12 @@ class Workspace:
             if is_open:
                 if editor.frame is not None:
                     self.records = self.records.with_frame(editor.frame, editor.now())
-                if plots.draw_reference(editor.rendering.is_pinned, editor.frame is not None):
+                told = editor.rendering
+                asked = plots.draw_reference(told.is_pinned, told.is_stale, editor.frame is not None)
+                if asked.is_switch:
                     rendering.pin(editor)
+                if asked.is_again:
+                    rendering.pin_again(editor)
                 plots.draw(self.records, editor.preferences.step_ms)
 
 
@@ -286,6 +290,13 @@ def _draw_notices(editor: Editor, area: Rect[float]) -> None:
     building = editor.rendering.building
     if building is not None and not editor.rendering.has_failed:
         notices.draw_building(building.done, building.total, area)
+    waiting = editor.rendering.waiting
+    if waiting and editor.frame is not None:
+        answer = notices.draw_waiting(len(waiting), editor.frame, editor.control.paused, area)
+        if answer == "now":
+            pictures.take_now(editor)
+        elif answer == "forget":
+            pictures.forget(editor)
 
 
 def _draw_dialog(editor: Editor) -> None:

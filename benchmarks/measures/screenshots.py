@@ -209,6 +209,7 @@ def draw_method(hand: Hand, spp: int) -> Pixels:
     turn_cube(hand)
     refine(hand, spp)
     hand.key("F9")
+    hand.pump(lambda: editor.rendering.is_pinned, timeout=60)
     hand.key("ctrl+z")
     hand.key("ctrl+z")
     hand.key("alt+a")

@@ -364,6 +364,11 @@ def _export(soak: Soak) -> None:
     path.unlink(missing_ok=True)
     soak.hand.key("ctrl+e")
     soak.hand.type_into("Path", str(path))
+    editor = soak.hand.app.editor
+    soak.hand.pump(lambda: path.exists() or bool(editor.rendering.waiting), timeout=60)
+    if not path.exists():
+        # What is left of an edit takes minutes, and forever where rendering is paused.
+        soak.hand.click("Take it as it is")
     soak.hand.pump(path.exists, timeout=60)
 
 

@@ -15,6 +15,13 @@ from incpt.render.session import Session
 SUFFIXES = (".exr", ".png")
 
 
+def shown_image(session: Session, denoised: npt.NDArray[np.float32] | None = None) -> npt.NDArray[np.float32]:
+    """(H, W, 3) the radiance that a picture for displays is made of, or (H, W, 4) with alpha under the
+    setting `transparent`. `denoised` (H, W, 3) takes the place of what was rendered."""
+    image = session.image(alpha=session.settings.transparent)
+    return image if denoised is None else np.concatenate([denoised, image[..., 3:]], axis=-1)
+
+
 def write_picture(
     path: Path,
     session: Session,
@@ -36,13 +43,11 @@ def write_picture(
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise InputError(f"{path}: ends in no known format; use .exr or .png")
+    if suffix == ".png":
+        images.write_png(path, shown_image(session, denoised), exposure, curve)
+        return
     is_transparent = session.settings.transparent
     image = session.image(alpha=is_transparent)
-    if suffix == ".png":
-        if denoised is not None:
-            image = np.concatenate([denoised, image[..., 3:]], axis=-1)
-        images.write_png(path, image, exposure, curve)
-        return
     layers: dict[str, Any] = {"RGBA" if is_transparent else "RGB": image}
     if denoised is not None:
         layers["denoised.RGB"] = denoised

@@ -1,5 +1,8 @@
 """What passes between an editor and its renderer: requests go in, messages come out.
 
+Requests for the picture itself (Export, Copy, Pin) wait until it is whole: at full resolution, and with
+nothing left of an edit that it does not show yet. Waiting tells which do.
+
 `Renderer` is all that an editor needs; `threaded.ThreadedRenderer` is one.
 """
 
@@ -8,6 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
 
 from incpt.viewer.view import Frame, View
 
@@ -43,6 +49,15 @@ class Export:
 
 
 @dataclass(frozen=True)
+class Copy:
+    """Give the picture as an Export to .png would write it."""
+
+    exposure: float = 0.0
+    curve: str = "agx"
+    denoise: bool = False
+
+
+@dataclass(frozen=True)
 class Pin:
     """Compare with the picture as it is now, or no longer."""
 
@@ -50,11 +65,21 @@ class Pin:
 
 
 @dataclass(frozen=True)
+class TakeNow:
+    """Requests that wait for the whole picture take it as it is."""
+
+
+@dataclass(frozen=True)
+class Forget:
+    """Requests that wait for the whole picture are given up."""
+
+
+@dataclass(frozen=True)
 class Restart:
     """Throw away what was accumulated."""
 
 
-Request = Pick | PickBox | Export | Pin | Restart
+Request = Pick | PickBox | Export | Copy | Pin | TakeNow | Forget | Restart
 
 
 @dataclass(frozen=True)
@@ -84,9 +109,24 @@ class PickedBox:
 
 @dataclass(frozen=True)
 class Exported:
-    """The picture is in the file."""
+    """The picture is in the file; `size` is its width and height, pixels."""
 
     path: Path
+    size: tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class CopiedPicture:
+    """The answer to a Copy: sRGB `pixels` (H, W, 3), or (H, W, 4) with alpha."""
+
+    pixels: npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Waiting:
+    """The requests that wait for the whole picture from now on, in their order; none: all are answered."""
+
+    requests: tuple[Request, ...]
 
 
 @dataclass(frozen=True)
@@ -97,7 +137,7 @@ class Problem:
     fatal: bool = False
 
 
-Message = Frame | Building | Picked | PickedBox | Exported | Problem
+Message = Frame | Building | Picked | PickedBox | Exported | CopiedPicture | Waiting | Problem
 
 
 class Renderer(Protocol):

@@ -204,6 +204,14 @@ def shows(side: Side, view: View) -> bool:
     )
 
 
+def is_whole(side: Side, view: View) -> bool:
+    """Whether the picture is one of the view's scene alone: no preview, and nothing is left of an edit, or as
+    little as the view asks for."""
+    is_still = view.before is None and shows(side, view)
+    is_found = side.progress.mode is Mode.REFINE and not side.progress.error_left
+    return is_still and side.divisor == 1 and (is_found or is_done(side, view.target_spp))
+
+
 def may_change(side: Side, view: View, now: float) -> bool:
     """Whether the last change has been answered, or is not worth to wait for."""
     is_dragged = side.view.before is not None or view.before is not None

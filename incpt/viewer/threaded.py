@@ -20,8 +20,11 @@ from incpt.scene.model import Scene
 from incpt.viewer.denoising import DenoisingThread
 from incpt.viewer.renderer import (
     Building,
+    CopiedPicture,
+    Copy,
     Export,
     Exported,
+    Forget,
     Message,
     Pick,
     PickBox,
@@ -30,6 +33,8 @@ from incpt.viewer.renderer import (
     Pin,
     Problem,
     Request,
+    TakeNow,
+    Waiting,
 )
 from incpt.viewer.view import Frame, View
 from incpt.viewer.viewer import RenderingStoppedError, Viewer
@@ -55,6 +60,7 @@ class ThreadedRenderer:
         self._view: View | None = None
         self._requests: deque[Request] = deque()
         self._messages: list[Message] = []
+        self._waiting: list[Request] = []
         self._closing = False
         self._images: tuple[object, ...] = ()
         self._posted_at = 0.0
@@ -152,9 +158,8 @@ class ThreadedRenderer:
             return
         viewer = Viewer(self._view, device, self._report_building)
         while not self._closing:
-            for request in self._take_requests():
-                self._answer(viewer, request)
             view = self._view
+            self._answer_all(viewer, view)
             try:
                 frame = viewer.advance(view, partial(self._has_edit_after, view))
             except RenderingStoppedError:
@@ -184,6 +189,31 @@ class ThreadedRenderer:
                 lambda: self._closing or bool(self._requests) or self._has_edit_after(view), DRAWING_SECONDS
             )
 
+    def _answer_all(self, viewer: Viewer, view: View) -> None:
+        """Answer what was asked, but for what waits until the picture of the view is whole."""
+        before = list(self._waiting)
+        for request in self._take_requests():
+            match request:
+                case Export() | Copy() | Pin(on=True):
+                    self._waiting += [request] if request not in self._waiting else []
+                case TakeNow():
+                    self._answer_waiting(viewer)
+                case Forget():
+                    self._waiting = []
+                case _:
+                    if isinstance(request, Pin):
+                        self._waiting = [one for one in self._waiting if not isinstance(one, Pin)]
+                    self._answer(viewer, request)
+        if self._waiting and viewer.is_whole(view):
+            self._answer_waiting(viewer)
+        if self._waiting != before:
+            self._post(Waiting(tuple(self._waiting)))
+
+    def _answer_waiting(self, viewer: Viewer) -> None:
+        waiting, self._waiting = self._waiting, []
+        for request in waiting:
+            self._answer(viewer, request)
+
     def _answer(self, viewer: Viewer, request: Request) -> None:
         try:
             if isinstance(request, Pick):
@@ -193,7 +223,10 @@ class ThreadedRenderer:
             elif isinstance(request, Export):
                 denoised = self._denoiser.denoised if request.denoise else None
                 viewer.export(request.path, request.aovs, request.exposure, request.curve, denoised)
-                self._post(Exported(request.path))
+                self._post(Exported(request.path, viewer.session.size))
+            elif isinstance(request, Copy):
+                denoised = self._denoiser.denoised if request.denoise else None
+                self._post(CopiedPicture(viewer.displayed(request.exposure, request.curve, denoised)))
             elif isinstance(request, Pin):
                 viewer.pin_reference(request.on)
             else:

@@ -109,6 +109,7 @@ class Frame:
                  though they still carried something.
     resting      paused, or the target is reached: nothing is under way.
     is_pinned    there is a reference to compare with, or there will be once the picture is whole.
+    is_stale     that is of another scene.
     """
 
     view: View
@@ -122,3 +123,4 @@ class Frame:
     cut_off: float
     resting: bool
     is_pinned: bool = False
+    is_stale: bool = False

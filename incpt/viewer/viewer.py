@@ -17,10 +17,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from incpt.core.errors import DeviceError, InputError
 from incpt.device.device import Device
-from incpt.render.export import write_picture
+from incpt.picture.tone_mapping import tone_map_covered
+from incpt.render.export import shown_image, write_picture
 from incpt.render.modes import Mode
 from incpt.render.path_buffer import check_settings
 from incpt.render.session import Session, StepReport
@@ -63,6 +65,8 @@ class Viewer:
         self._on_build, self._clock = on_build, clock
         self._refused: View | None = None
         self._reference: Float32Image | None = None
+        self._reference_scene: Scene | None = None
+        self._is_stale = False
         self._is_pinning = False
         self._rest_is_shown = False
         self._cannot_prepare = False
@@ -146,6 +150,7 @@ class Viewer:
         """Compare with the picture as it is now (with the next whole one of full resolution, where it is
         none), or no longer. The reference goes when the size changes."""
         self._reference, self._is_pinning = None, on
+        self._reference_scene, self._is_stale = None, False
         self._rest_is_shown = False
 
     def export(
@@ -156,8 +161,29 @@ class Viewer:
         curve: str = "agx",
         denoised: Callable[[Session], Float32Image] | None = None,
     ) -> None:
-        """Write the picture of the chosen strategy at full resolution; see `write_picture`. Where it is not
-        whole yet, that is done first. `denoised` makes the denoised picture of a session, if it is wanted."""
+        """Write the picture of the chosen strategy at full resolution; see `write_picture`. Pixels without a
+        sample get one first. `denoised` makes the denoised picture of a session, if it is wanted."""
+        self._fill()
+        clean = None if denoised is None else denoised(self.session)
+        write_picture(Path(path), self.session, aovs, exposure, curve, clean)
+
+    def displayed(
+        self,
+        exposure: float = 0.0,
+        curve: str = "agx",
+        denoised: Callable[[Session], Float32Image] | None = None,
+    ) -> npt.NDArray[np.uint8]:
+        """(H, W, 3) or (H, W, 4) the picture in sRGB as `export` writes it to a .png."""
+        self._fill()
+        clean = None if denoised is None else denoised(self.session)
+        return tone_map_covered(shown_image(self.session, clean), exposure, curve)
+
+    def is_whole(self, view: View) -> bool:
+        """Whether the picture is at full resolution, and one of the scene of `view` alone."""
+        return scheduler.is_whole(self._main, view)
+
+    def _fill(self) -> None:
+        """Bring the picture to full resolution, with a sample in each pixel."""
         place, main = len(self._seats) - 1, self._main
         if main.divisor > 1:
             settings = scheduler.settings_of(main.view, main.strategy, main.whole, 1)
@@ -165,8 +191,6 @@ class Viewer:
         while self.session.mode is Mode.BASE:
             slots = scheduler.slots_of_step(self._main, self._state.view.step_ms)
             self._step(Step(place, slots, self._state.spent))
-        clean = None if denoised is None else denoised(self.session)
-        write_picture(Path(path), self.session, aovs, exposure, curve, clean)
 
     # ------------------------------------------------------------------------------------ following the view
 
@@ -244,9 +268,12 @@ class Viewer:
         side = self._state.sides[work.side]
         self._note(work.side, scheduler.followed(side, work, session.progress, self._clock()))
         session.build(self._on_build, for_edits=False)
+        self._is_stale = self._reference_scene is not None and not _is_same_picture(
+            self._reference_scene, session.scene
+        )
         height_width = work.view.size[::-1]
         if self._reference is not None and self._reference.shape[:2] != height_width:
-            self._reference = None
+            self._reference, self._reference_scene, self._is_stale = None, None, False
 
     def _return_to_full(self, work: ReturnToFull) -> None:
         session = self._seats[work.side].session
@@ -300,6 +327,7 @@ class Viewer:
             image = self._seats[-1].reader.image(main, must_be_new=True)
             if image[..., 3].min() > 0:
                 self._reference, self._is_pinning = image[..., :3], False
+                self._reference_scene = self.session.scene
         pictures = tuple(
             seat.reader.picture(side, self._reference, resting, first_sight)
             for seat, side in zip(self._seats, self._state.sides, strict=True)
@@ -321,7 +349,13 @@ class Viewer:
             cut_off=scheduler.share_cut_off(self._state.sides),
             resting=resting,
             is_pinned=self._reference is not None or self._is_pinning,
+            is_stale=self._is_stale,
         )
+
+
+def _is_same_picture(first: Scene, second: Scene) -> bool:
+    """Whether two scenes have the same picture, whatever they propose about how to render it."""
+    return first is second or replace(first, settings=second.settings) == second
 
 
 def _explain(error: Exception) -> str:

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from weakref import WeakKeyDictionary
 
+import numpy as np
+import PIL.Image
 import pytest
 from support.null_renderer import NullRenderer
 from support.small_scenes import mixed_scene
@@ -18,8 +20,11 @@ from incpt.render.session import Session
 from incpt.scene.model import Scene
 from incpt.viewer.renderer import (
     Building,
+    CopiedPicture,
+    Copy,
     Export,
     Exported,
+    Forget,
     Message,
     Pick,
     PickBox,
@@ -29,6 +34,8 @@ from incpt.viewer.renderer import (
     Problem,
     Renderer,
     Restart,
+    TakeNow,
+    Waiting,
 )
 from incpt.viewer.threaded import ThreadedRenderer
 from incpt.viewer.view import Frame, View
@@ -99,7 +106,7 @@ def test_answers_requests(renderer: ThreadedRenderer, tmp_path: Path) -> None:
     renderer.request(PickBox((0.48, 0.48), (0.52, 0.52), takes_out=True))
     assert wait_for(renderer, PickedBox) == PickedBox(("red cube",), True)
     renderer.request(Export(tmp_path / "a.exr", aovs=True))
-    assert wait_for(renderer, Exported) == Exported(tmp_path / "a.exr")
+    assert wait_for(renderer, Exported) == Exported(tmp_path / "a.exr", mixed_scene().settings.size)
     assert (tmp_path / "a.exr").stat().st_size > 1000
     renderer.show(View(scene, target_spp=3))
     wait_for(renderer, Frame, lambda frame: frame.resting and frame.view.target_spp == 3)
@@ -109,6 +116,47 @@ def test_answers_requests(renderer: ThreadedRenderer, tmp_path: Path) -> None:
     again = wait_for(renderer, Frame, lambda frame: frame.resting)
     assert isinstance(frame, Frame) and isinstance(again, Frame)
     assert again.pictures[0].image is not frame.pictures[0].image and again.pictures[0].error < 1e-3
+
+
+def until(renderer: Renderer, last: Message) -> list[Message]:
+    """All messages up to that one."""
+    said: list[Message] = []
+    end = time.monotonic() + PATIENCE
+    while last not in said:
+        assert time.monotonic() < end, said
+        said += renderer.poll()
+        time.sleep(0.005)
+    return said
+
+
+def test_what_takes_the_picture_waits_until_it_is_whole(renderer: ThreadedRenderer, tmp_path: Path) -> None:
+    scene = mixed_scene()
+    edited = moved(scene)
+    renderer.show(View(scene, target_spp=8))
+    wait_for(renderer, Frame, lambda frame: frame.resting)
+    export, other = Export(tmp_path / "a.png"), Export(tmp_path / "b.png")
+    renderer.show(View(edited, target_spp=8, paused=True))
+    for request in (export, Copy(), export, Pin(True)):
+        renderer.request(request)
+    wait_for(renderer, Waiting, lambda told: told.requests == (export, Copy(), Pin(True)))
+    renderer.request(Pin(False))
+    wait_for(renderer, Waiting, lambda told: told.requests == (export, Copy()))
+    assert not (tmp_path / "a.png").exists()
+    renderer.request(TakeNow())
+    said = until(renderer, Waiting(()))
+    assert [one.path for one in said if isinstance(one, Exported)] == [export.path]
+    (copied,) = [one for one in said if isinstance(one, CopiedPicture)]
+    assert copied.pixels.shape == (*scene.settings.size[::-1], 3)
+    renderer.request(other)
+    wait_for(renderer, Waiting, lambda told: told.requests == (other,))
+    renderer.request(Forget())
+    wait_for(renderer, Waiting, lambda told: told.requests == ())
+    renderer.request(other)
+    renderer.show(View(edited, target_spp=8))
+    wait_for(renderer, Exported)
+    before, after = (np.asarray(PIL.Image.open(path.path), float) for path in (export, other))
+    difference = np.abs(before - after)
+    assert difference.max() > 60, "one shows what moved, the other does not"
 
 
 def test_problem_of_a_request_or_an_edit_ends_nothing(

@@ -377,6 +377,26 @@ def test_split_gives_both_sides_equal_time(make_viewer: MakeViewer) -> None:
     assert len(viewer.advance(view_of(moved(scene))).pictures) == 1  # type: ignore[union-attr]
 
 
+@pytest.mark.parametrize("strategy", ["spiral", "impact"])
+def test_a_picture_is_whole_where_it_shows_the_scene_alone(make_viewer: MakeViewer, strategy: str) -> None:
+    scene = mixed_scene(strategy=strategy)
+    viewer, _ = make_viewer(view_of(scene), speed=FAST)
+    assert not viewer.is_whole(view_of(scene)), "it has pixels without a sample"
+    run_to(viewer, view_of(scene), lambda frame: frame.pictures[0].tile_spp.min() >= 2)
+    assert viewer.is_whole(view_of(scene))
+    edited = view_of(moved(scene))
+    assert not viewer.is_whole(edited), "it shows the scene before the edit"
+    viewer.advance(edited)
+    assert not viewer.is_whole(edited), "a part of it does"
+    left = set()
+    while not viewer.is_whole(edited):
+        frame = viewer.advance(edited)
+        assert frame is not None
+        left.add(bool(frame.pictures[0].error_left))
+    assert (True in left) == (strategy == "impact") and frame.pictures[0].mode is Mode.REFINE
+    assert viewer.is_whole(edited) and not viewer.is_whole(view_of(moved(scene), before=scene))
+
+
 def test_error_against_a_pinned_reference(make_viewer: MakeViewer) -> None:
     scene = mixed_scene()
     viewer, _ = make_viewer(view_of(scene, target_spp=4), speed=FAST)
@@ -384,8 +404,18 @@ def test_error_against_a_pinned_reference(make_viewer: MakeViewer) -> None:
     viewer.pin_reference(True)
     frame = viewer.advance(view_of(scene, target_spp=4))
     assert frame is not None and frame.pictures[0].error == 0 and frame.is_pinned
-    pinned = frames_until_rest(viewer, view_of(turned(scene, 61), target_spp=4))[-1].pictures[0].error
-    assert pinned is not None and 0.01 < pinned < 1
+    assert not frame.is_stale
+    last = frames_until_rest(viewer, view_of(turned(scene, 61), target_spp=4))[-1]
+    pinned = last.pictures[0].error
+    assert pinned is not None and 0.01 < pinned < 1 and last.is_stale
+    other_settings = replace(scene, settings=replace(scene.settings, nor=8))
+    assert not frames_until_rest(viewer, view_of(other_settings, target_spp=4))[-1].is_stale
+    viewer.pin_reference(False)
+    last = frames_until_rest(viewer, view_of(turned(scene, 61), target_spp=4))[-1]
+    assert not last.is_pinned and not last.is_stale
+    viewer.pin_reference(True)
+    last = frames_until_rest(viewer, view_of(turned(scene, 61), target_spp=4))[-1]
+    assert last.is_pinned and not last.is_stale and last.pictures[0].error == 0
     smaller = view_of(turned(scene, 61), target_spp=4, resolution_scale=0.5)
     last = frames_until_rest(viewer, smaller)[-1]
     assert last.pictures[0].error is None and not last.is_pinned

@@ -6,12 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from incpt.core.errors import InputError
-from incpt.picture import tone_mapping
 from incpt.ui.commands.files import ask_path, stem
 from incpt.ui.dialogs.native import FileFilter
-from incpt.ui.editor import clipboard
 from incpt.ui.editor.editor import Editor
-from incpt.viewer.renderer import Export
+from incpt.viewer.renderer import Copy, Export, Forget, TakeNow
 
 PICTURES = FileFilter("Pictures", (".png", ".exr"))
 """Files that the picture can be written to."""
@@ -25,8 +23,8 @@ def export_picture(editor: Editor) -> None:
 
 
 def export_to(editor: Editor, path: Path) -> None:
-    """Write the picture: PNG as it is shown, EXR linear with the AOVs, and denoised too where that is
-    shown."""
+    """Write the picture, once it is whole: PNG as it is shown, EXR linear with the AOVs, and denoised too
+    where that is shown."""
     if path.suffix.lower() not in PICTURES.suffixes:
         raise InputError(f"{path}: ends in no known format; use .exr or .png")
     display = editor.preferences.display
@@ -35,10 +33,16 @@ def export_to(editor: Editor, path: Path) -> None:
 
 
 def copy_picture(editor: Editor) -> None:
-    """Put the picture on the clipboard as it is shown."""
-    assert editor.frame is not None
+    """Put the picture on the clipboard as it is shown, once it is whole."""
     display = editor.preferences.display
-    picture = editor.frame.pictures[-1]
-    image = picture.shown if picture.transparent else picture.shown[..., :3]
-    clipboard.copy_picture(tone_mapping.tone_map_covered(image, display.exposure, display.curve))
-    editor.say("the picture is on the clipboard", "done")
+    editor.renderer.request(Copy(display.exposure, display.curve, editor.view.denoise))
+
+
+def take_now(editor: Editor) -> None:
+    """Take the picture as it is, for all that waits until it is whole."""
+    editor.renderer.request(TakeNow())
+
+
+def forget(editor: Editor) -> None:
+    """Give up what waits until the picture is whole."""
+    editor.renderer.request(Forget())

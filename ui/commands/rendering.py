@@ -21,5 +21,10 @@ def switch_pause(editor: Editor) -> None:
 
 
 def pin(editor: Editor) -> None:
-    """Measure errors against the picture as it is now, or stop measuring."""
+    """Measure errors against the picture as it is once it is whole, or stop measuring."""
     editor.renderer.request(Pin(not editor.rendering.is_pinned))
+
+
+def pin_again(editor: Editor) -> None:
+    """Measure errors against the picture of the scene as it is now, once that is whole."""
+    editor.renderer.request(Pin(True))

@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from incpt.core.errors import DeviceError, InputError, OutputError, one_line
@@ -21,13 +22,24 @@ from incpt.scene.edits import Copied
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
 from incpt.ui.display.overlays import NEEDS_FIRST_HITS
+from incpt.ui.editor import clipboard
 from incpt.ui.editor.dialog import Answer, Dialog
 from incpt.ui.editor.document import Document
 from incpt.ui.editor.notices import Notices
 from incpt.ui.editor.state import Beginning, Control, Gesture, Rendering, Screen, Tool
 from incpt.ui.editor.viewing import ShownScenes, Viewing
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
-from incpt.viewer.renderer import Exported, Message, Pick, Picked, PickedBox, Problem, Renderer, Restart
+from incpt.viewer.renderer import (
+    CopiedPicture,
+    Exported,
+    Message,
+    Pick,
+    Picked,
+    PickedBox,
+    Problem,
+    Renderer,
+    Restart,
+)
 from incpt.viewer.view import Frame, View
 
 OpenRenderer = Callable[[str | None], Renderer]
@@ -279,7 +291,9 @@ class Editor:
         """Render on another device from now on. The last picture stays until that one has one."""
         self.renderer.close()
         self.control = replace(self.control, device=device)
-        self.rendering = replace(self.rendering, is_pinned=False, has_failed=False)
+        self.rendering = replace(
+            self.rendering, is_pinned=False, is_stale=False, waiting=(), has_failed=False
+        )
         self.renderer = self._open_renderer(device)
         self.renderer.show(self.view)
 
@@ -296,10 +310,17 @@ class Editor:
                 case PickedBox():
                     self.select(self.selection.boxed(message.names, message.takes_out))
                 case Exported():
-                    self.say(f"{message.path} is written", "done")
+                    width, height = message.size
+                    self.say(f"{message.path} is written, {width} × {height} pixels", "done")
+                case CopiedPicture():
+                    self.attempt(partial(self._take_copy, message))
                 case Problem():
                     self.say(message.text, "error")
         return messages
+
+    def _take_copy(self, copied: CopiedPicture) -> None:
+        clipboard.copy_picture(copied.pixels)
+        self.say("the picture is on the clipboard", "done")
 
     def _take_pick(self, picked: Picked) -> None:
         dropped = self.screen.dropped

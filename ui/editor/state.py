@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from incpt.viewer.renderer import Building, Message, Problem
+from incpt.viewer.renderer import Building, Message, Problem, Request, Waiting
 from incpt.viewer.view import Frame
 
 
@@ -46,23 +46,36 @@ class Rendering:
     frame       the latest frame; None before the first.
     building    how far the kernels are built; None while none are.
     is_pinned   whether errors are measured against a pinned picture.
+    is_stale    whether that picture is of another scene.
+    waiting     the requests that wait for the whole picture.
     has_failed  whether the device does nothing more until it is opened again.
     """
 
     frame: Frame | None = None
     building: Building | None = None
     is_pinned: bool = False
+    is_stale: bool = False
+    waiting: tuple[Request, ...] = ()
     has_failed: bool = False
 
     def after(self, message: Message) -> Rendering:
         """What is known after one more message."""
         match message:
             case Frame():
-                return replace(self, frame=message, building=None, is_pinned=message.is_pinned)
+                return replace(
+                    self,
+                    frame=message,
+                    building=None,
+                    is_pinned=message.is_pinned,
+                    is_stale=message.is_stale,
+                )
+            case Waiting():
+                return replace(self, waiting=message.requests)
             case Building():
                 return replace(self, building=message if message.done < message.total else None)
             case Problem():
-                return replace(self, has_failed=self.has_failed or message.fatal)
+                waiting = () if message.fatal else self.waiting
+                return replace(self, has_failed=self.has_failed or message.fatal, waiting=waiting)
         return self
 
 

@@ -10,7 +10,7 @@ from incpt.scene.selection import Selection
 from incpt.ui.editor.notices import Notice
 from incpt.ui.panels.render import MODE_TEXTS, found_text
 from incpt.ui.rect import Rect
-from incpt.ui.widgets import places, theme
+from incpt.ui.widgets import places, theme, widgets
 from incpt.viewer.view import Frame, Picture
 
 _COLORS = {"done": theme.QUIET, "warning": theme.WARNING, "error": theme.ERROR}
@@ -56,7 +56,7 @@ def status_text(
             parts.append(found)
         parts.append(_samples_text(picture, found is not None) + _denoised_text(picture))
         if picture.error is not None:
-            parts.append(f"RMSE {picture.error:.5f}")
+            parts.append(f"RMSE {picture.error:.5f}" + (" to a stale reference" if frame.is_stale else ""))
     names = selection.names
     if len(names) == 1:
         parts.append(names[0])
@@ -100,6 +100,40 @@ def draw_notices(notices: Sequence[Notice], picture: Rect[float]) -> Notice | No
         imgui.pop_text_wrap_pos()
     imgui.end()
     return dismissed
+
+
+def draw_waiting(count: int, frame: Frame, is_paused: bool, picture: Rect[float]) -> str | None:
+    """How far the picture is that `count` requests wait for, at the bottom of it; returns "now" where they
+    shall take it as it is, "forget" where they are given up."""
+    pivot = imgui.ImVec2(0.5, 1.0)
+    bottom = picture.top + picture.height - imgui.get_text_line_height()
+    imgui.set_next_window_pos(imgui.ImVec2(picture.middle[0], bottom), imgui.Cond_.always, pivot)
+    answer = None
+    if imgui.begin("##waiting", None, _FLOATING)[0]:
+        what = "1 picture waits" if count == 1 else f"{count} pictures wait"
+        imgui.text_unformatted(f"{what} until all of it shows the scene as it is now")
+        width = imgui.get_item_rect_size().x
+        share, text = _whole_share(frame)
+        imgui.progress_bar(share, imgui.ImVec2(width, 0), "Paused" if is_paused else text)
+        places.note("waiting")
+        if widgets.button("Take it as it is"):
+            answer = "now"
+        widgets.same_line()
+        if widgets.button("Give up##waiting"):
+            answer = "forget"
+    imgui.end()
+    return answer
+
+
+def _whole_share(frame: Frame) -> tuple[float, str]:
+    """Which share of the picture is there, and in words."""
+    picture = frame.pictures[-1]
+    if frame.is_preview:
+        return 0.0, "Preview"
+    if picture.error_left:
+        return 1 - picture.error_left, found_text(picture) or ""
+    done, total = picture.queue_done, len(picture.queue)
+    return done / max(total, 1), f"{done:,} of {total:,} tiles"
 
 
 def draw_building(done: int, total: int, picture: Rect[float]) -> None:

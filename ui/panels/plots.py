@@ -2,17 +2,35 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from imgui_bundle import imgui, implot
 
 from incpt.ui.editor.records import Records, Series
-from incpt.ui.widgets import places, widgets
+from incpt.ui.widgets import places, theme, widgets
 
 
-def draw_reference(is_pinned: bool, has_picture: bool) -> bool:
-    """The button that pins a picture, or lets go of it; returns whether it was pressed."""
+@dataclass(frozen=True)
+class ReferenceRequest:
+    """What the user asked for about the pinned picture: to pin one or let go of it, or to pin another."""
+
+    is_switch: bool = False
+    is_again: bool = False
+
+
+def draw_reference(is_pinned: bool, is_stale: bool, has_picture: bool) -> ReferenceRequest:
+    """The buttons of the pinned picture, which `is_stale` where it is of another scene; returns what is asked
+    for."""
     with widgets.row("Reference", "Errors are measured against the picture as it was when pinned"):
-        return widgets.button("Unpin" if is_pinned else "Pin this picture", enabled=has_picture)
+        is_switch = widgets.button("Unpin" if is_pinned else "Pin this picture", enabled=has_picture)
+        is_again = False
+        if is_stale:
+            widgets.same_line()
+            is_again = widgets.button("Pin again", "The picture of the scene as it is now")
+    if is_stale:
+        widgets.note("The reference is stale: it is of another scene.", theme.WARNING)
+    return ReferenceRequest(is_switch, is_again)
 
 
 def draw(records: Records, step_ms: float) -> None:

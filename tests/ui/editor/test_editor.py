@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -20,9 +21,21 @@ from incpt.scene import edits
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
 from incpt.ui.commands import command, materials, objects, pictures, table
+from incpt.ui.editor import clipboard
 from incpt.ui.panels.notices import status_text
 from incpt.ui.preferences import DisplaySettings, Preferences
-from incpt.viewer.renderer import Building, Export, Exported, Pin, Problem
+from incpt.viewer.renderer import (
+    Building,
+    CopiedPicture,
+    Copy,
+    Export,
+    Exported,
+    Forget,
+    Pin,
+    Problem,
+    TakeNow,
+    Waiting,
+)
 from incpt.viewer.view import Frame
 
 SCENE = mixed_scene(size=(48, 32))
@@ -160,10 +173,46 @@ def test_another_device_is_opened(user: Desk) -> None:
 
 
 def test_what_was_exported_is_said_for_a_while(user: Desk, tmp_path: Path) -> None:
-    tell(user, Exported(tmp_path))
-    assert user.texts() == [f"{tmp_path} is written"] and user.editor.notices.next_end is not None
+    tell(user, Exported(tmp_path, (48, 32)))
+    assert (
+        user.texts() == [f"{tmp_path} is written, 48 × 32 pixels"]
+        and user.editor.notices.next_end is not None
+    )
     user.rest(6.0)
     assert user.texts() == [] and user.editor.notices.next_end is None
+
+
+def test_what_waits_for_the_whole_picture_says_so(user: Desk, tmp_path: Path) -> None:
+    frame = frame_of(user.editor.view, Mode.INCREMENTAL)
+    tell(user, frame, Waiting((Export(tmp_path / "a.png"),)))
+    assert user.shows("waiting")
+    user.click("Take it as it is")
+    assert user.null.requests == [TakeNow()]
+    user.click("Give up##waiting")
+    assert user.null.requests == [TakeNow(), Forget()]
+    tell(user, Waiting(()))
+    assert not user.shows("waiting")
+
+
+def test_a_copy_goes_to_the_clipboard_once_it_is_there(user: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    taken: list[int] = []
+    monkeypatch.setattr(clipboard, "copy_picture", lambda pixels: taken.append(int(pixels.sum())))
+    tell(user, frame_of(user.editor.view))
+    user.editor.change_display(DisplaySettings(exposure=2.0, curve="filmic"))
+    user.run("Copy picture")
+    assert user.null.requests == [Copy(2.0, "filmic")] and not taken and user.texts() == []
+    tell(user, CopiedPicture(np.ones((2, 3, 3), np.uint8)))
+    assert taken == [18] and "is on the clipboard" in user.texts()[-1]
+
+
+def test_a_stale_reference_is_marked(user: Desk) -> None:
+    user.panel("Method")
+    tell(user, replace(frame_of(user.editor.view, error=0.25), is_pinned=True, is_stale=True))
+    user.click("Pin again")
+    assert user.null.requests == [Pin(True)]
+    assert "RMSE 0.25000 to a stale reference" in status_text(user.editor.frame, False, Selection())
+    tell(user, replace(frame_of(user.editor.view), is_pinned=True))
+    assert not user.shows("Pin again")
 
 
 def test_pinning_and_exporting_ask_the_renderer(user: Desk, tmp_path: Path) -> None:
