@@ -51,6 +51,7 @@ def save(scene: Scene, path: str | os.PathLike[str], *, template: str | None = N
     path = path_of("path", path)
     if path.suffix.lower() != ".toml":
         raise InputError(f"{path}: a scene is saved as TOML; end its name with .toml")
+    files.clear_left_behind(path.parent, path.stem)
     write_scene(scene, path, Beside(path), template)
 
 

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from incpt.core import files
 from incpt.core.errors import InputError, InputWarning, one_line
 from incpt.formats import registry, scene_save
 from incpt.formats.import_report import NOTHING_TOLD, ImportReport
@@ -74,6 +75,7 @@ class Document:
         of another renderer. `options` are those of `registry.load_with_report`; placeholders stand for meshes
         and images of a scene file that cannot be read. Raises InputError."""
         absolute = absolute_path(file)
+        files.clear_left_behind(absolute.parent, absolute.stem)
         scene, report = registry.load_with_report(absolute, allow_missing=True, **options)
         warnings = tuple(map(one_line, registry.complaints(absolute, scene, report)))
         is_scene = absolute.suffix.lower() == SUFFIX

@@ -164,8 +164,10 @@ def recovery_folder() -> Path:
 
 def find_left_behind(folder: Path | None = None) -> list[LeftBehind]:
     """The recovery files whose editor is gone, the latest first. Files that cannot be looked at are left
-    out, and locks of editors that ended without something to recover are removed."""
+    out, and locks of editors that ended without something to recover are removed, as is what was left half
+    written."""
     folder = recovery_folder() if folder is None else folder
+    files.clear_left_behind(folder)
     found = []
     try:
         locks = sorted(folder.glob(f"*{_LOCK}"))

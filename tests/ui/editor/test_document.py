@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import warnings
 from pathlib import Path
 
@@ -162,3 +163,18 @@ def test_saving_keeps_what_a_person_wrote(tmp_path: Path) -> None:
     document.save(tmp_path / "b.toml")
     assert "# the die" in (tmp_path / "b.toml").read_text() and "# mine" in (tmp_path / "b.toml").read_text()
     assert Document.open(tmp_path / "b.toml").scene == document.scene
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there it is told by age alone")
+@pytest.mark.parametrize("act", ["open", "save"])
+def test_what_was_left_half_written_goes_when_a_scene_is_opened_or_saved(tmp_path: Path, act: str) -> None:
+    path = tmp_path / "a.toml"
+    Document.new().save(path)
+    left = tmp_path / ".a.cube.0123.npz.99999999-abcdefgh.npz"
+    left.write_bytes(b"half")
+    os.utime(left, (0, 0))
+    if act == "open":
+        Document.open(path)
+    else:
+        Document.new().save(path)
+    assert sorted(tmp_path.iterdir()) == [path]
