@@ -75,14 +75,15 @@ class App:
     def turn(self) -> None:
         """Wait for something to happen, and draw a frame if it did."""
         editor = self.editor
-        wait = 0.0 if editor.gesture.is_flying else _WAITING_SECONDS if editor.is_waiting else _IDLE_SECONDS
+        is_changing = editor.is_waiting or editor.notices.is_fading(editor.now())
+        wait = 0.0 if editor.gesture.is_flying else _WAITING_SECONDS if is_changing else _IDLE_SECONDS
         is_due = self.window.wait(wait)
         if received := editor.receive():
             is_due = True
             # A picture moves no widget, so one frame is enough to show it.
             if not all(isinstance(message, Frame) for message in received):
                 self.window.redraw()
-        if is_due or editor.is_waiting or self._has_notice_ended():
+        if is_due or is_changing:
             self.frame()
         self._autosave()
 
@@ -133,10 +134,6 @@ class App:
         pixels = imgui.get_io().display_framebuffer_scale.x
         size = self.window.framebuffer_size
         draw_picture(self.editor, self.display, self._area, size, pixels)
-
-    def _has_notice_ended(self) -> bool:
-        end = self.editor.notices.next_end
-        return end is not None and self.editor.now() >= end
 
     def _keep_preferences(self) -> None:
         if self.editor.preferences != self._kept and not imgui.is_any_item_active():

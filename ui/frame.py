@@ -38,6 +38,8 @@ def take_frame(
     _take_outcome(editor, outcome)
     _take_material(editor, picture)
     captions.draw(editor.frame, overlay, editor.preferences.display, picture)
+    if not editor.has_light:
+        captions.draw_darkness(picture)
     editor.settle(viewport.is_held or imgui.is_any_item_active(), viewport.is_flying, viewport.hint)
     return area
 

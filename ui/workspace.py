@@ -284,7 +284,7 @@ def _others(editor: Editor) -> list[Placed]:
 
 def _draw_notices(editor: Editor, area: Rect[float]) -> None:
     editor.notices = editor.notices.current(editor.now())
-    dismissed = notices.draw_notices(editor.notices.said, area)
+    dismissed = notices.draw_notices(editor.notices.said, area, editor.now())
     if dismissed is not None:
         editor.notices = editor.notices.without(dismissed)
     building = editor.rendering.building

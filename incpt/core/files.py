@@ -14,7 +14,6 @@ from pathlib import Path
 
 from incpt.core.errors import InputError, OutputError, one_line
 
-
 _LONGEST_NAME = 80
 """Characters of a file's name that its temporary file has."""
 _WRITER = re.compile(r"\.(\d+)-\w{8}(\.\w+)?$")
@@ -57,8 +56,9 @@ def read_bytes(path: Path) -> bytes:
 def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     """Calls `write` with a new file beside `path`, flushes it to disk and renames it to `path`.
 
-    Whoever reads `path` sees the old file or the whole new one. On any failure the new file is
-    removed; what a writer that was killed has left of the same file is removed too. Raises OutputError where the system refuses: full disk, folder missing or not writable.
+    Whoever reads `path` sees the old file or the whole new one. On any failure the new file is removed; what
+    a writer that was killed has left of the same file is removed too. Raises OutputError where the system
+    refuses: full disk, folder missing or not writable.
     """
     temporary: Path | None = None
     try:

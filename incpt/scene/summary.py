@@ -21,12 +21,7 @@ def scene_problems(scene: Scene) -> list[str]:
     problems = []
     if not scene.objects and not scene.lights:
         problems.append("the scene has no objects: the picture shows the environment only")
-    picture = scene.environment.picture
-    is_bright = picture is None or bool(picture.pixels.any()) or scene.environment.has_sun
-    lit = any(c > 0 for c in scene.environment.radiance) and is_bright
-    lit = lit or any(light.is_emissive for light in scene.lights)
-    shining = (scene.materials[o.material] for o in scene.objects if o.visible)
-    if not lit and not any(material.is_emissive or material.unlit for material in shining):
+    if not has_light(scene):
         problems.append(
             "the scene has no light: the picture will be black; "
             "add a light, an environment or an emissive material"
@@ -40,6 +35,18 @@ def scene_problems(scene: Scene) -> list[str]:
             "one pixel of each image covers all, unwrap the mesh"
         )
     return problems
+
+
+def has_light(scene: Scene) -> bool:
+    """Whether anything shines that is shown: the environment, a light, or a material of an object."""
+    picture = scene.environment.picture
+    is_bright = picture is None or bool(picture.pixels.any()) or scene.environment.has_sun
+    if any(c > 0 for c in scene.environment.radiance) and is_bright:
+        return True
+    if any(light.visible and light.is_emissive for light in scene.lights):
+        return True
+    shining = {name for name, one in scene.materials.items() if one.is_emissive or one.unlit}
+    return any(obj.visible and obj.material in shining for obj in scene.objects)
 
 
 def _needed_uv_sets(material: Material) -> int:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from incpt.core.errors import DeviceError, InputError, OutputError, one_line
 from incpt.picture import denoise
-from incpt.scene import edits
+from incpt.scene import edits, summary
 from incpt.scene.camera import Camera
 from incpt.scene.edits import Copied
 from incpt.scene.model import Scene
@@ -78,6 +78,8 @@ class Editor:
         self._before_move: Viewing | None = None
         """Where the view was before the move of it that is under way."""
         self._shown = ShownScenes()
+        self._lit: tuple[Scene, bool] | None = None
+        """The last scene that was asked whether anything shines in it, and whether it does."""
 
     # ---------------------------------------------------------------------------------- the scene
 
@@ -90,6 +92,13 @@ class Editor:
     def shown(self) -> Scene:
         """The same scene as it is looked at; see `viewing`. What is made of it can be proposed as well."""
         return self._shown.of(self.scene, self.viewing.camera)
+
+    @property
+    def has_light(self) -> bool:
+        """Whether anything shines in the scene."""
+        if self._lit is None or self._lit[0] is not self.scene:
+            self._lit = self.scene, summary.has_light(self.scene)
+        return self._lit[1]
 
     def propose(
         self,

@@ -8,6 +8,8 @@ LEVELS = ("done", "warning", "error")
 """What a notice is: good news, a remark, or something that failed."""
 _SECONDS = {"done": 5.0, "warning": 15.0}
 """How long a notice of a level is shown; one of another level stays until it is dismissed."""
+FADE_SECONDS = 1.0
+"""How long it takes a notice to fade before it goes."""
 _MOST = 6
 """How many notices are shown at once."""
 
@@ -24,6 +26,10 @@ class Notice:
     def end(self) -> float | None:
         """When it goes away by itself, in seconds of the same clock; None: it does not."""
         return self.at + _SECONDS[self.level] if self.level in _SECONDS else None
+
+    def opacity(self, now: float) -> float:
+        """1, and less while it fades."""
+        return 1.0 if self.end is None else min(max((self.end - now) / FADE_SECONDS, 0.0), 1.0)
 
 
 @dataclass(frozen=True)
@@ -45,6 +51,10 @@ class Notices:
     def current(self, now: float) -> Notices:
         """Without those that are over."""
         return Notices(tuple(one for one in self.said if one.end is None or now < one.end))
+
+    def is_fading(self, now: float) -> bool:
+        """Whether one of them looks otherwise from frame to frame."""
+        return self.next_end is not None and now >= self.next_end - FADE_SECONDS
 
     @property
     def next_end(self) -> float | None:

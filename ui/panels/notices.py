@@ -10,7 +10,7 @@ from incpt.scene.selection import Selection
 from incpt.ui.editor.notices import Notice
 from incpt.ui.panels.render import MODE_TEXTS, found_text
 from incpt.ui.rect import Rect
-from incpt.ui.widgets import places, theme, widgets
+from incpt.ui.widgets import icons, places, theme, widgets
 from incpt.viewer.view import Frame, Picture
 
 _COLORS = {"done": theme.QUIET, "warning": theme.WARNING, "error": theme.ERROR}
@@ -77,8 +77,9 @@ def _denoised_text(picture: Picture) -> str:
     return "" if picture.denoised is None else ", denoised"
 
 
-def draw_notices(notices: Sequence[Notice], picture: Rect[float]) -> Notice | None:
-    """Notices, at the top left of the picture, below one another; returns the one that was dismissed."""
+def draw_notices(notices: Sequence[Notice], picture: Rect[float], now: float) -> Notice | None:
+    """Notices, at the top left of the picture, below one another; returns the one that was dismissed. `now`
+    is the time of the editor's clock, in seconds. What is no good news can be copied to the clipboard."""
     if not notices:
         return None
     line = imgui.get_text_line_height()
@@ -91,11 +92,19 @@ def draw_notices(notices: Sequence[Notice], picture: Rect[float]) -> Notice | No
         imgui.push_text_wrap_pos(max(picture.width - 6 * line, 100.0))
         for i, notice in enumerate(notices):
             imgui.push_id(i)
+            imgui.push_style_var(imgui.StyleVar_.alpha, max(notice.opacity(now), 0.01))
             if imgui.small_button("×"):
                 dismissed = notice
             places.note(f"dismiss {i}")
             imgui.same_line()
+            if notice.level != "done":
+                if imgui.small_button(icons.COPY):
+                    imgui.set_clipboard_text(notice.text)
+                places.note(f"copy {i}")
+                imgui.set_item_tooltip("Copy this line")
+                imgui.same_line()
             imgui.text_colored(imgui.ImVec4(*_COLORS[notice.level]), notice.text)
+            imgui.pop_style_var()
             imgui.pop_id()
         imgui.pop_text_wrap_pos()
     imgui.end()

@@ -8,11 +8,12 @@ from incpt.ui.display.overlays import Overlay
 from incpt.ui.display.projection import split_x
 from incpt.ui.preferences import DisplaySettings
 from incpt.ui.rect import Point, Rect
-from incpt.ui.widgets import theme
+from incpt.ui.widgets import places, theme
 from incpt.viewer.view import Frame, Picture
 
 _NUMBERS_MARGIN = 4.0
 """How much wider than its number a tile has to be on the screen for numbers to be written, in points."""
+_DARKNESS = "Nothing shines in this scene: add a light, or an environment in the Scene panel"
 
 
 def draw(frame: Frame | None, overlay: Overlay | None, settings: DisplaySettings, area: Rect[float]) -> None:
@@ -26,6 +27,14 @@ def draw(frame: Frame | None, overlay: Overlay | None, settings: DisplaySettings
         _write_legend(canvas, overlay, area)
     if settings.split and len(frame.pictures) == 2:
         _write_sides(canvas, frame, settings.split_position, area)
+
+
+def draw_darkness(area: Rect[float]) -> None:
+    """Write why the picture is black, in the middle of it."""
+    size = imgui.calc_text_size(_DARKNESS)
+    x, y = area.middle
+    write_label(imgui.get_background_draw_list(), (x - size.x / 2, y - size.y / 2), _DARKNESS)
+    places.note_rect("darkness", Rect(x - size.x / 2, y - size.y / 2, size.x, size.y))
 
 
 def write_label(canvas: imgui.ImDrawList, at: Point, text: str) -> None:

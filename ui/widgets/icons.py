@@ -11,4 +11,5 @@ CUBE, LIGHTBULB = "\uf1b2", "\uf0eb"
 """An object, and a light."""
 WARNING = "\uf071"
 """Something is missing."""
-ALL = (EYE, EYE_SLASH, CUBE, LIGHTBULB, WARNING)
+COPY = "\uf0c5"
+"""To the clipboard."""

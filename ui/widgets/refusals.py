@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from incpt.core.errors import InputError, one_line
+from incpt.ui.widgets import widgets
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -26,7 +27,7 @@ class Refusals:
         try:
             return make()
         except InputError as error:
-            self.messages.append(one_line(str(error)))
+            self.messages.append(_as_labelled(one_line(str(error))))
             return old
 
     def changed(self, owner: D, **fields: Any) -> D:
@@ -35,3 +36,11 @@ class Refusals:
         if all(getattr(owner, name) == value for name, value in fields.items()):
             return owner
         return self.accepted(owner, lambda: replace(owner, **fields))
+
+
+def _as_labelled(message: str) -> str:
+    """A message whose first word is the name of a parameter, as in files, with the label of the field that
+    was changed in its place."""
+    name, colon, rest = message.partition(": ")
+    is_parameter = bool(colon) and name.isidentifier() and name.islower()
+    return f"{widgets.edited_label()}: {rest}" if is_parameter and widgets.edited_label() else message

@@ -22,6 +22,8 @@ _LABEL_SHARE = 0.38
 """Width of a label, as a share of its row's."""
 _edited = [0]
 """imgui's number of the widget whose value changed last; a list of one, so that functions can set it."""
+_edited_label = [""]
+"""The label of that widget."""
 
 
 @contextmanager
@@ -262,6 +264,11 @@ def edited() -> int:
     return _edited[0]
 
 
+def edited_label() -> str:
+    """The label of that widget, as it is on the screen."""
+    return _edited_label[0]
+
+
 def _note(name: str, has_changed: bool) -> None:
     places.note(name)
     # imgui tells of no change where the number that was typed is the one that the first object has.
@@ -269,7 +276,7 @@ def _note(name: str, has_changed: bool) -> None:
     if is_given:
         mixed.give(name)
     if has_changed or is_given:
-        _edited[0] = imgui.get_item_id()
+        _edited[0], _edited_label[0] = imgui.get_item_id(), name
 
 
 def _axis_mark(axis: int, name: str) -> None:

@@ -415,3 +415,29 @@ def test_undo_and_redo_lead_through_the_same_scenes(sequence: list[tuple[str, An
         for scene in scenes[-2::-1]:
             command.run(user.editor, table.command("Redo"))
             assert user.scene == scene
+
+
+def test_an_error_is_copied(user: Desk) -> None:
+    user.editor.say("all is well", "done")
+    user.editor.say("x.obj: no such file", "error")
+    user.frames(3)
+    assert not user.shows("copy 0")
+    user.click("copy 1")
+    assert imgui.get_clipboard_text() == "x.obj: no such file" and len(user.texts()) == 2
+
+
+def test_a_scene_in_which_nothing_shines_says_so(user: Desk) -> None:
+    assert not user.shows("darkness")
+    user.editor.propose(SCENE.with_environment(image=None, color=(0, 0, 0)), "Night")
+    user.frames(2)
+    assert not user.shows("darkness"), "the lamp shines"
+    user.editor.propose(user.scene.with_object("lamp", visible=False), "Hide")
+    user.frames(2)
+    assert user.shows("darkness")
+    scene, (name,) = edits.add_light(user.scene, "spot")
+    user.editor.propose(scene, "Light")
+    user.frames(2)
+    assert not user.shows("darkness")
+    user.editor.propose(user.scene.with_light(name, visible=False), "Hide")
+    user.frames(2)
+    assert user.shows("darkness")

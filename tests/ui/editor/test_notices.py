@@ -46,3 +46,12 @@ def test_the_first_end_counts() -> None:
 def test_one_is_dismissed() -> None:
     notices = Notices().with_notice("a", "error", 0.0).with_notice("b", "error", 0.0)
     assert texts(notices.without(notices.said[0])) == ["b"]
+
+
+def test_what_goes_by_itself_fades() -> None:
+    notices = Notices().with_notice("a", "done", 2.0).with_notice("b", "error", 2.0)
+    good, bad = notices.said
+    assert [good.opacity(at) for at in (2.0, 6.0, 6.5, 7.0)] == [1.0, 1.0, 0.5, 0.0]
+    assert bad.opacity(1e9) == 1.0
+    assert not notices.is_fading(5.9) and notices.is_fading(6.1)
+    assert not Notices().with_notice("b", "error", 2.0).is_fading(1e9)
