@@ -113,6 +113,12 @@ class Desk:
         assert 0 <= x < WINDOW[0] and 0 <= y < WINDOW[1], f"{name!r} lies outside of the window"
         return x, y
 
+    def height(self, name: str) -> float:
+        """Of what is seen of a widget, points."""
+        rect = places.find(name)
+        assert rect is not None
+        return rect.height
+
     def shows(self, name: str) -> bool:
         return places.find(name) is not None
 

@@ -113,6 +113,8 @@ def _row(
         outcome = replace(outcome, made_of=(name, material))
     if _is_missing(one):
         imgui.set_item_tooltip(f"Its mesh is missing: {one.mesh.source.file}")  # type: ignore[union-attr]
+    if pressed:  # A row at the edge may be seen in part only.
+        imgui.internal.scroll_to_item(imgui.internal.ScrollFlags_.keep_visible_edge_y)
     if pressed and imgui.is_mouse_double_clicked(0):
         state = state.begun_renaming(name)
     if pressed:

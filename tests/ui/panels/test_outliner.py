@@ -125,6 +125,10 @@ def test_what_is_selected_or_added_is_scrolled_to(crowd: Scene) -> None:
         user.editor.select(Selection(("cube 7000", seen[3])))
         user.frames(3)
         assert rows(user) == seen, "what is in sight stays where it is"
+        user.wheel_at(f"object {seen[3]}", 0.1)
+        cut_off = min(rows(user), key=lambda name: user.height(f"object {name}"))
+        user.click(f"object {cut_off}")
+        assert user.height(f"object {cut_off}") == user.height(f"object {rows(user)[5]}")
         user.run("Sphere")
         user.frames(2)
         assert "sphere" in rows(user)
