@@ -356,6 +356,7 @@ def _open(soak: Soak) -> None:
     if is_dirty:
         soak.hand.click("Do not save")
     soak.hand.type_into("Path", str(soak.file))
+    soak.hand.pump(lambda: not editor.jobs)
     soak.model = Model([registry.load(soak.file)])
 
 

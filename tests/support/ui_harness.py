@@ -27,6 +27,7 @@ from incpt.scene.model import Scene
 from incpt.scene.texture import Bitmap
 from incpt.scene.transform import Transform
 from incpt.ui.commands import command, menus, table
+from incpt.ui.editor import job
 from incpt.ui.editor.document import Document
 from incpt.ui.editor.editor import Editor
 from incpt.ui.frame import take_frame
@@ -39,6 +40,8 @@ from incpt.viewer.renderer import Message, Renderer
 from incpt.viewer.view import Frame, Picture, View
 from support.null_renderer import NullRenderer
 
+job.QUICK_SECONDS = 60.0
+"""Tests are about what is read and not about waiting for it, unless they say so."""
 WINDOW = (1600, 3400)
 """Tall enough that no panel has to be scrolled."""
 SECONDS_PER_FRAME = 1 / 60

@@ -141,6 +141,7 @@ def test_values_are_dragged_and_typed_undone_saved_and_opened_again(
     assert len(editor.scene.objects) == 2
     hand.key("ctrl+o")
     answer_path(hand, tmp_path / "moved.toml")
+    hand.pump(lambda: not editor.jobs)
     assert editor.scene == moved and not editor.document.history.can_undo
     hand.pump(lambda: is_answered(hand) and window.is_whole(hand))
     keep(hand, "5-opened-again")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from incpt.core.layout import TextureSlot
-from incpt.formats import bitmaps, insert, registry, relink
+from incpt.formats import bitmaps, import_report, insert, mesh_files, registry, relink
 from incpt.formats.bitmaps import load_bitmap
 from incpt.formats.gltf_writer.export import export
 from incpt.formats.pack import pack
@@ -149,6 +149,21 @@ def drop(editor: Editor, path: Path, slot: TextureSlot | None = None) -> None:
     if insert.file_kind(path) is FileKind.SCENE:
         open_file(editor, path)
         return
+    if insert.file_kind(path) is FileKind.MESH:
+        # What was read is at hand as long as it is in use, so that adding it reads nothing again.
+        editor.begin_job(
+            f"Reading {path.name}", lambda: _read_mesh(path), lambda _kept: _add_file(editor, path)
+        )
+    else:
+        _add_file(editor, path)
+
+
+def _read_mesh(path: Path) -> object:
+    with import_report.gathered():
+        return mesh_files.load_file(path)
+
+
+def _add_file(editor: Editor, path: Path) -> None:
     with collected_warnings() as warnings:
         scene, names = insert.drop_file(editor.shown, path)
     for warning in warnings:
@@ -243,7 +258,16 @@ def _path_of_missing(editor: Editor, missing: MissingFile) -> PathDialog:
 
 
 def _open_now(editor: Editor, path: Path) -> None:
-    start_over(editor, Document.open(path), opened=path)
+    before = editor.document, editor.scene
+
+    def show(document: Document) -> None:
+        # What was edited while the file was read is not lost without a question.
+        if (editor.document, editor.scene) == before:
+            start_over(editor, document, opened=path)
+        else:
+            _when_saved(editor, lambda: start_over(editor, document, opened=path))
+
+    editor.begin_job(f"Opening {path.name}", lambda: Document.open(path), show)
 
 
 def _when_saved(editor: Editor, then: Callable[[], None]) -> None:

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from incpt.core.errors import DeviceError, InputError, OutputError, one_line
 from incpt.picture import denoise
@@ -22,9 +23,10 @@ from incpt.scene.edits import Copied
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
 from incpt.ui.display.overlays import NEEDS_FIRST_HITS
-from incpt.ui.editor import clipboard
+from incpt.ui.editor import clipboard, job
 from incpt.ui.editor.dialog import Answer, Dialog
 from incpt.ui.editor.document import Document
+from incpt.ui.editor.job import Job
 from incpt.ui.editor.notices import Notices
 from incpt.ui.editor.state import Beginning, Control, Gesture, Rendering, Screen, Tool
 from incpt.ui.editor.viewing import ShownScenes, Viewing
@@ -77,6 +79,7 @@ class Editor:
         self.viewing = Viewing()
         self._before_move: Viewing | None = None
         """Where the view was before the move of it that is under way."""
+        self.jobs: tuple[Job, ...] = ()
         self._shown = ShownScenes()
         self._lit: tuple[Scene, bool] | None = None
         """The last scene that was asked whether anything shines in it, and whether it does."""
@@ -169,6 +172,19 @@ class Editor:
             following = answer.again
         if self.dialog is None:
             self.dialog = following
+
+    def begin_job(self, label: str, work: Callable[[], Any], then: Callable[[Any], object]) -> None:
+        """Do `work` in a thread, and then in a frame to come `then` with what it gives; at once where it
+        takes no time. Raises what either raises then."""
+        begun = Job(label, work, then)
+        if begun.wait(job.QUICK_SECONDS):
+            begun.finish()
+        else:
+            self.jobs = (*self.jobs, begun)
+
+    def give_up_job(self, given_up: Job) -> None:
+        """Let nothing come of a job."""
+        self.jobs = tuple(one for one in self.jobs if one is not given_up)
 
     def say(self, text: str, level: str) -> None:
         """Show a notice; `level` is one of notices.LEVELS."""
@@ -309,7 +325,10 @@ class Editor:
     # ----------------------------------------------------------------------------------- one frame
 
     def receive(self) -> list[Message]:
-        """Take the renderer's messages, and return them."""
+        """Take what jobs have read, and the renderer's messages, which are returned."""
+        for done in [one for one in self.jobs if one.is_done]:
+            self.give_up_job(done)
+            self.attempt(done.finish)
         messages = self.renderer.poll()
         for message in messages:
             self.rendering = self.rendering.after(message)
@@ -362,9 +381,10 @@ class Editor:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether a frame is due soon without an event: the camera flies, or an entry of the history, or a
-        move of the view, waits for a rest."""
-        return self.gesture.is_flying or (self._is_dragging and not self.gesture.is_held)
+        """Whether a frame is due soon without an event: the camera flies, a file is read, or an entry of the
+        history, or a move of the view, waits for a rest."""
+        is_at_work = self.gesture.is_flying or bool(self.jobs)
+        return is_at_work or (self._is_dragging and not self.gesture.is_held)
 
     # --------------------------------------------------------------------------------------- files
 

@@ -15,6 +15,8 @@ from incpt.viewer.view import Frame, Picture
 
 _COLORS = {"done": theme.QUIET, "warning": theme.WARNING, "error": theme.ERROR}
 """Colours of notices, by level."""
+_JOB_LINES = 22.0
+"""Width of the bar of what is read, in heights of a line."""
 _FLOATING = (
     imgui.WindowFlags_.no_decoration
     | imgui.WindowFlags_.no_docking
@@ -109,6 +111,28 @@ def draw_notices(notices: Sequence[Notice], picture: Rect[float], now: float) ->
         imgui.pop_text_wrap_pos()
     imgui.end()
     return dismissed
+
+
+def draw_jobs(jobs: Sequence[tuple[str, float]], picture: Rect[float]) -> int | None:
+    """What is read, and for how many seconds, in the middle of the picture; returns the number of the one
+    that was given up. No reader tells how far it is, so the bar only tells that it is at work."""
+    if not jobs:
+        return None
+    place = imgui.ImVec2(picture.middle[0], picture.top + picture.height / 3)
+    imgui.set_next_window_pos(place, imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
+    given_up = None
+    if imgui.begin("##jobs", None, _FLOATING)[0]:
+        for number, (label, seconds) in enumerate(jobs):
+            imgui.push_id(number)
+            width = imgui.get_text_line_height() * _JOB_LINES
+            imgui.progress_bar(-imgui.get_time(), imgui.ImVec2(width, 0), f"{label}, {seconds:.0f} s")
+            places.note(f"job {number}")
+            imgui.same_line()
+            if widgets.button("Give up##job"):
+                given_up = number
+            imgui.pop_id()
+    imgui.end()
+    return given_up
 
 
 def draw_waiting(count: int, frame: Frame, is_paused: bool, picture: Rect[float]) -> str | None:

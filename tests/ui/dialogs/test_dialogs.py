@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import threading
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,13 +12,14 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
+import trimesh
 from support.parameters import A_TEXTURE
 from support.small_scenes import mixed_scene
 from support.ui_harness import Desk, changes, desk, flat, state
 
 from incpt.core.errors import OutputError
 from incpt.core.layout import TextureSlot
-from incpt.formats import bitmaps, registry, scene_save
+from incpt.formats import bitmaps, mesh_files, registry, scene_save
 from incpt.scene.selection import Selection
 from incpt.ui.commands import camera, files, pictures
 from incpt.ui.commands.table import command
@@ -25,7 +27,7 @@ from incpt.ui.dialogs import native
 from incpt.ui.dialogs.path_dialog import PathDialog
 from incpt.ui.dialogs.question import Question
 from incpt.ui.dialogs.relink_dialog import RelinkDialog
-from incpt.ui.editor import clipboard
+from incpt.ui.editor import clipboard, job
 from incpt.ui.editor.document import Document, new_scene
 from incpt.ui.editor.recovery import LeftBehind, Recovery
 from incpt.ui.panels import textures
@@ -624,3 +626,71 @@ def test_what_a_crash_left_is_opened_though_a_file_is_gone(user: Desk, torn: Pat
     files.start_over(user.editor, Recovery(1.0, tmp_path / "kept").recover(left))
     assert isinstance(user.editor.dialog, RelinkDialog) and len(user.editor.dialog.missing) == 3
     assert user.editor.document.path == torn and user.editor.document.is_dirty
+
+
+# ------------------------------------------------------------------------------------ read in the background
+
+
+@pytest.fixture
+def gate(monkeypatch: pytest.MonkeyPatch) -> threading.Event:
+    """Holds up all reading until it is set; nothing is waited for."""
+    opened = threading.Event()
+    monkeypatch.setattr(job, "QUICK_SECONDS", 0.0)
+    for owner, name in ((mesh_files, "load_file"), (registry, "load_with_report")):
+        read = getattr(owner, name)
+        monkeypatch.setattr(owner, name, lambda *a, _read=read, **k: (opened.wait(30), _read(*a, **k))[1])
+    return opened
+
+
+def come_to_an_end(user: Desk) -> None:
+    for one in user.editor.jobs:
+        assert one.wait(30)
+    user.frames(3)
+
+
+def test_a_mesh_is_read_while_the_window_goes_on(user: Desk, tmp_path: Path, gate: threading.Event) -> None:
+    trimesh.creation.box().export(tmp_path / "box.ply")
+    files.drop(user.editor, tmp_path / "box.ply")
+    user.frames(3)
+    assert user.shows("job 0") and user.editor.is_waiting and user.undo_count == 0
+    user.run("Cube")
+    gate.set()
+    come_to_an_end(user)
+    assert not user.shows("job 0") and user.editor.selection.names == ("box",) and user.undo_count == 2
+    user.key("Ctrl+Z")
+    assert "cube" in user.scene.object_index and "box" not in user.scene.object_index
+
+
+def test_reading_is_given_up(user: Desk, tmp_path: Path, gate: threading.Event) -> None:
+    trimesh.creation.box().export(tmp_path / "box.ply")
+    files.drop(user.editor, tmp_path / "box.ply")
+    (begun,) = user.editor.jobs
+    user.frames(3)
+    user.click("Give up##job")
+    gate.set()
+    assert begun.wait(30) and user.editor.jobs == ()
+    user.frames(3)
+    assert user.scene is SCENE and user.texts() == []
+
+
+def test_what_cannot_be_read_is_said_when_that_is_known(
+    user: Desk, tmp_path: Path, gate: threading.Event
+) -> None:
+    (tmp_path / "broken.ply").write_text("no mesh")
+    files.drop(user.editor, tmp_path / "broken.ply")
+    assert user.texts() == []
+    gate.set()
+    come_to_an_end(user)
+    assert "broken.ply" in user.texts()[-1] and user.scene is SCENE
+
+
+def test_what_was_edited_while_a_scene_was_read_is_not_lost(
+    user: Desk, other: Path, gate: threading.Event
+) -> None:
+    files.open_file(user.editor, other)
+    user.run("Cube")
+    gate.set()
+    come_to_an_end(user)
+    assert isinstance(user.editor.dialog, Question) and "cube" in user.scene.object_index
+    choose(user, "Do not save")
+    assert user.scene == OTHER and user.editor.document.path == other
