@@ -58,8 +58,9 @@ class PathDialog:
         imgui.set_next_item_width(-1)
         _, self.text = imgui.input_text("##path", self.text)
         places.note("Path")
-        self._draw_folder()
+        is_opened = self._draw_folder()
         chosen = modal.buttons(["Save" if self.is_saving else "Open", "Cancel"])
+        chosen = 0 if is_opened else chosen
         modal.end()
         if chosen is None:
             return None
@@ -92,7 +93,9 @@ class PathDialog:
         is_of_home = self.text.startswith("~")
         return absolute_path(self.text if is_of_home else os.path.join(self._folder, self.text))
 
-    def _draw_folder(self) -> None:
+    def _draw_folder(self) -> bool:
+        """The files of the folder that is typed; returns whether one was double-clicked."""
+        is_opened = False
         try:
             typed = self._typed()
         except InputError:
@@ -105,10 +108,14 @@ class PathDialog:
                 self.text = f"{folder.parent}/".replace("//", "/")
             places.note("../")
             for name in _entries(folder, self.kind.suffixes):
-                if imgui.selectable(name, name == typed.name)[0]:
+                flags = imgui.SelectableFlags_.allow_double_click
+                if imgui.selectable(name, name == typed.name, flags)[0]:
                     self.text = str(folder / name) + ("/" if name.endswith("/") else "")
+                    is_double = imgui.is_mouse_double_clicked(imgui.MouseButton_.left)
+                    is_opened = is_opened or (is_double and not name.endswith("/"))
                 places.note(name)
         imgui.end_child()
+        return is_opened
 
 
 def _entries(folder: Path, suffixes: tuple[str, ...]) -> list[str]:

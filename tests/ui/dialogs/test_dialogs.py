@@ -108,6 +108,19 @@ def test_a_scene_is_opened_by_clicking_on_it(user: Desk, other: Path, tmp_path: 
     assert user.scene == OTHER and user.editor.document.path == tmp_path / "sub" / "a.toml"
 
 
+def test_a_scene_is_opened_by_a_double_click(user: Desk, other: Path, tmp_path: Path) -> None:
+    (tmp_path / "sub").mkdir()
+    user.key("Ctrl+O")
+    user.frames(3)
+    user.open_field("sub/")
+    user.frames(2)
+    assert isinstance(user.editor.dialog, PathDialog), "a folder is entered"
+    choose(user, "../")
+    user.open_field("other.toml")
+    user.frames(2)
+    assert user.editor.dialog is None and user.scene == OTHER and user.editor.document.path == other
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "typed", ["missing.toml", "bad.toml", "x.docx", "~nobody-of-that-name/a.toml", "", " "]
