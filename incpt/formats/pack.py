@@ -14,6 +14,7 @@ from incpt.core.errors import InputError, OutputError
 from incpt.core.files import write_atomically
 from incpt.formats import bitmaps, images, mesh_store
 from incpt.formats.names import Names
+from incpt.formats.relink import check_nothing_missing
 from incpt.formats.scene_save import (
     Beside,
     file_label,
@@ -40,6 +41,7 @@ def pack(scene: Scene, path: str | os.PathLike[str]) -> None:
     for a folder that has something in it, and for a scene that no file can hold.
     """
     require("scene", scene, Scene, "a Scene")
+    check_nothing_missing(scene)
     path = path_of("path", path)
     if path.suffix.lower() == ".zip":
         with tempfile.TemporaryDirectory() as made:

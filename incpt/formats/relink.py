@@ -44,6 +44,14 @@ def missing_files(scene: Scene) -> tuple[MissingFile, ...]:
     return tuple(MissingFile(Path(file), kind, tuple(names)) for (file, kind), names in users.items())
 
 
+def check_nothing_missing(scene: Scene) -> None:
+    """Raises InputError, one line, where placeholders would be handed over as if they were the scene."""
+    missing = missing_files(scene)
+    if missing:
+        others = f" and {len(missing) - 1:,} more" if len(missing) > 1 else ""
+        raise InputError(f"scene: {missing[0].path}{others}: cannot be read; find what is missing first")
+
+
 def relinked(scene: Scene, missing: Path, found: Path) -> Scene:
     """The scene with the file `found` in place of `missing`, and in place of all others that are missing what
     is found beside it: under the same name in its folder, or at the place where it was beside `missing`.

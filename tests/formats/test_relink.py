@@ -10,7 +10,8 @@ import pytest
 import trimesh
 
 from incpt.core.errors import InputError
-from incpt.formats import bitmaps, images, registry, relink, scene_save
+from incpt.formats import bitmaps, images, pack, registry, relink, scene_save
+from incpt.formats.gltf_writer.export import export as write_gltf
 from incpt.formats.import_report import Fate
 from incpt.scene.model import Scene
 from incpt.scene.texture import Bitmap
@@ -144,3 +145,11 @@ def test_what_cannot_be_read_stays_missing(scene_file: Path, tmp_path: Path) -> 
         relink.relinked(scene, missing, there / "maps" / "nothing.png")
     (there / "maps" / "bent.png").write_bytes(b"no image")
     assert list(files_of(relink.relinked(scene, missing, there / "maps" / "wood.png"))) == ["bent.png"]
+
+
+def test_a_scene_is_not_handed_over_with_placeholders(scene_file: Path, tmp_path: Path) -> None:
+    scene, _ = lost(scene_file, tmp_path)
+    for write, name in ((pack.pack, "packed.zip"), (write_gltf, "scene.glb")):
+        with pytest.raises(InputError, match=r"two.glb and 3 more: cannot be read; find what is missing"):
+            write(scene, tmp_path / name)
+        assert not (tmp_path / name).exists()

@@ -24,6 +24,7 @@ from incpt.formats.gltf_writer.losses import Losses
 from incpt.formats.gltf_writer.materials import MaterialWriter
 from incpt.formats.names import Names
 from incpt.formats.placement import transform_of
+from incpt.formats.relink import check_nothing_missing
 from incpt.scene.camera import Camera
 from incpt.scene.light import Light
 from incpt.scene.material import Material
@@ -51,6 +52,7 @@ def export(scene: Scene, path: str | os.PathLike[str]) -> None:
     Raises InputError: another suffix, or more than 4 GiB; OutputError where the file cannot be written.
     """
     require("scene", scene, Scene, "a Scene")
+    check_nothing_missing(scene)
     path = path_of("path", path)
     if path.suffix.lower() != _SUFFIX:
         raise InputError(f"{path}: a scene is exported as {_SUFFIX}; end its name so")
