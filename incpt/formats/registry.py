@@ -146,7 +146,7 @@ def load_with_report(
 ) -> tuple[Scene, ImportReport]:
     """A scene as `load` gives it, and what became of its files: nothing is warned of. Raises InputError."""
     path = path_of("path", path)
-    options = ImportOptions(time, allow_outside, up, unit, allow_missing)
+    options = ImportOptions(time, allow_outside, up, unit, allow_missing=allow_missing)
     check_readable(path)
     row = format_of(path, FileKind.SCENE, FileKind.MESH)
     if row is None:

@@ -139,7 +139,7 @@ def test_blocks_and_wavefront_agree(sky: Sky) -> None:
     "sky", [Sky(60), Sky(25, sun_size=9), Sky(25, sun_disc=False), Sky(-4), None], ids=str
 )
 def test_another_sky_starts_the_picture_over(sky: Sky | None) -> None:
-    scene = skied(base_nor=4)
+    scene = skied(base_nor=4, strategy="spiral")
     session = Session(scene, device=device())
     session.render(4)
     session.edit(scene.with_object("red cube", position=(0.2, 0.5, 0)))

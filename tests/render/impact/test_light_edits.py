@@ -210,7 +210,12 @@ changes = st.one_of(
     st.fixed_dictionaries({"color": st.tuples(unit, unit, unit)}),
     st.fixed_dictionaries({"radius": st.floats(0.05, 0.4), "size": st.tuples(*[st.floats(0.1, 1)] * 2)}),
     st.fixed_dictionaries({"spot_angle": st.floats(10, 170), "spot_blend": unit}),
-    st.fixed_dictionaries({"kind": st.sampled_from(["point", "spot", "rectangle", "disk", "sphere"])}),
+    st.fixed_dictionaries(
+        {
+            "kind": st.sampled_from(["point", "spot", "rectangle", "disk", "sphere"]),
+            "radius": st.floats(0.05, 0.4),
+        }
+    ),
     st.fixed_dictionaries(
         {name: st.booleans() for name in ("visible", "camera_visible", "casts_shadows", "double_sided")}
     ),
@@ -230,7 +235,7 @@ goings = st.builds(
 )
 surroundings = st.builds(
     lambda values: lambda s: s.with_environment(**values),
-    st.fixed_dictionaries({"rotation_y": st.floats(-180, 180), "intensity": st.floats(0, 1)}),
+    st.fixed_dictionaries({"rotation_y": st.floats(-180, 180), "intensity": st.floats(0.1, 1)}),
 )
 suns = st.builds(
     lambda values: lambda s: s.with_light("sun", **values),
@@ -241,7 +246,7 @@ moves = st.builds(lambda at: lambda s: s.with_object("red cube", position=at), p
 
 @pytest.mark.slow
 @hypothesis_settings(
-    max_examples=8,
+    max_examples=6,
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )

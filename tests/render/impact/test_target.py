@@ -165,13 +165,13 @@ def test_snapshots_hold_it(device: Device) -> None:
 
 
 def test_the_picture_converges_to_that_of_the_scene(device: Device) -> None:
-    fresh = refined(device, SECOND, 512).image()
+    fresh = refined(device, SECOND, 96).image()
     truth = Session(replace(SECOND), size=SIZE, settings=replace(SECOND.settings, seed=9), device=device)
-    truth.render(1024)
+    truth.render(512)
     session = refined(device, START)
     for scene in (FIRST, moved(FIRST, 0.1), SECOND):
         session.edit(scene)
         known(session)
-    session.render(512)
+    session.render(96)
     errors = [float(np.sqrt(((image - truth.image()) ** 2).mean())) for image in (session.image(), fresh)]
     assert errors[0] < 1.25 * errors[1]
