@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from incpt.benchmarks.impact.edits import DRAG_STEPS, STAGES, drag_step
+from incpt.benchmarks.impact.edits import DRAG_STEPS, FIRST_STEPS, STAGES, drag_step
 from incpt.benchmarks.kit.denoise import GUIDES, Denoiser
 from incpt.benchmarks.kit.pictures import FloatImage, Gallery
 from incpt.benchmarks.measures.edits import EditBench, Note
@@ -167,10 +167,12 @@ class ImpactBench:
         settings: RenderSettings,
         marks: Sequence[int],
         note: Note,
+        between: Scene | None = None,
     ) -> Iterator[Shown]:
-        """The pictures after an edit that makes `after`, after so many steps: marks rise."""
+        """The pictures after an edit that makes `after`, after so many steps: marks rise. An edit before it
+        made the scene `between`, if there is one."""
         chosen = variant.settings(settings)
-        session = start.at(start.start(chosen, lambda f: note(0.3 * f)))
+        session = _edited(start.at(start.start(chosen, lambda f: note(0.3 * f))), between)
         session.edit(after)
         purse = Purse(session)
         for done, mark in enumerate(marks):
@@ -187,6 +189,7 @@ class ImpactBench:
         marks: Sequence[float],
         note: Note,
         ready: Callable[[], None],
+        between: Scene | None = None,
     ) -> tuple[list[Shown], dict[str, Any]]:
         """The pictures on the screen so many seconds after an edit, and how long its parts took: marks rise.
         The clock runs while the edit is made, steps are taken and pictures are read, of which a viewer takes
@@ -198,7 +201,7 @@ class ImpactBench:
         chosen = variant.settings(settings)
         kept = start.start(chosen, lambda f: note(0.2 * f))
         delay = self._warmed(start.at(kept), after, variant)
-        session = start.at(kept)
+        session = _edited(start.at(kept), between)
         clock = _Clock(self._clock, session, marks, delay)
         ready()
         clock.edit(after)
@@ -263,6 +266,14 @@ class ImpactBench:
             self._finished(read)
             times.append(self._clock() - began)
         return statistics.median(times)
+
+
+def _edited(session: Session, scene: Scene | None) -> Session:
+    """The session after a first edit that makes a scene, if there is one."""
+    if scene is not None:
+        session.edit(scene)
+        Purse(session).spend(FIRST_STEPS)
+    return session
 
 
 def _median_ms(seconds: Sequence[float]) -> float:

@@ -57,7 +57,7 @@ def impact(
     quick: options.QuickOption = False,
     device: options.DeviceOption = None,
 ) -> None:
-    """Errors after 28 edits and a drag, of impact, restarting, restarting with a denoiser, and spirals."""
+    """Errors after 31 edits and a drag, of impact, restarting, restarting with a denoiser, and spirals."""
     usual = _QUICK if quick else _FULL
     plan = Plan(
         edits=options.chosen("--edit", edit, (*EDITS, DRAG)),

@@ -58,13 +58,14 @@ STAGES = {
 class SceneEdit:
     """An edit of a stage: `words` say what it does, `change` does it. Where the scene of the file will not
     do, `prepared` makes the one before the edit. An edit that is not `local` leaves nothing of the picture as
-    it was."""
+    it was. Where there is a `first` edit, that has been made before, and FIRST_STEPS steps were taken."""
 
     stage: str
     words: str
     change: Callable[[Scene], Scene]
     prepared: Callable[[Scene], Scene] | None = None
     local: bool = True
+    first: Callable[[Scene], Scene] | None = None
 
     @cached_property
     def before(self) -> Scene:
@@ -73,9 +74,14 @@ class SceneEdit:
         return scene if self.prepared is None else self.prepared(scene)
 
     @cached_property
+    def between(self) -> Scene | None:
+        """The scene after the first edit, if there is one."""
+        return None if self.first is None else self.first(self.before)
+
+    @cached_property
     def after(self) -> Scene:
         """The edited scene."""
-        return self.change(self.before)
+        return self.change(self.before if self.between is None else self.between)
 
 
 def _moved(name: str, **placement: tuple[float, float, float]) -> Callable[[Scene], Scene]:
@@ -129,6 +135,20 @@ def _liquids(scene: Scene) -> Scene:
     for priority, absorption in (("lower", (30, 8, 12)), ("equal", (6, 24, 10)), ("higher", (18, 18, 4))):
         scene = scene.with_material(f"liquid of {priority} priority", absorption=absorption)
     return scene
+
+
+FIRST_STEPS = 30
+"""Steps between a first edit and the one that is measured."""
+DRAG, DRAG_STAGE, DRAG_STEPS = "drag", "cornell", 20
+"""The drag's name among the edits, where it happens, and its edits."""
+
+
+def drag_step(scene: Scene, number: int) -> Scene:
+    """The Cornell box after so many of the DRAG_STEPS edits of a drag of its short block: to the side,
+    towards the eye and turned, by equal parts."""
+    part = number / DRAG_STEPS
+    position = (0.0925 - 0.11 * part, 0.0825, -0.169 + 0.08 * part)
+    return scene.with_object("short block", position=position, rotation=(0.0, -17.0 + 40.0 * part, 0.0))
 
 
 EDITS = {
@@ -211,16 +231,23 @@ EDITS = {
     "turn": SceneEdit(
         "editing", "turn environment", lambda scene: scene.with_environment(rotation_y=215.0), local=False
     ),
+    "again": SceneEdit(
+        "cornell",
+        "cornell: move block again",
+        lambda scene: drag_step(scene, DRAG_STEPS),
+        first=lambda scene: drag_step(scene, 12),
+    ),
+    "movecolour": SceneEdit(
+        "editing",
+        "recolour red cube after a move",
+        _recoloured("red", base_color=(0.04, 0.35, 0.30)),
+        first=_moved("red cube", position=(-0.45, 0.17, 1.25)),
+    ),
+    "another": SceneEdit(
+        "editing",
+        "move gold ball after red cube",
+        _moved("gold ball", position=(1.55, 0.4, 0.15)),
+        first=_moved("red cube", position=(-0.45, 0.17, 1.25)),
+    ),
 }
 """By name; in the order of the tables."""
-
-DRAG, DRAG_STAGE, DRAG_STEPS = "drag", "cornell", 20
-"""The drag's name among the edits, where it happens, and its edits."""
-
-
-def drag_step(scene: Scene, number: int) -> Scene:
-    """The Cornell box after so many of the DRAG_STEPS edits of a drag of its short block: to the side,
-    towards the eye and turned, by equal parts."""
-    part = number / DRAG_STEPS
-    position = (0.0925 - 0.11 * part, 0.0825, -0.169 + 0.08 * part)
-    return scene.with_object("short block", position=position, rotation=(0.0, -17.0 + 40.0 * part, 0.0))

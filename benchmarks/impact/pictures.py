@@ -40,7 +40,7 @@ def _write(folder: Path, bench: ImpactBench, plan: Plan, base: int, name: str, n
     for variant in variants(plan.nors):
         if bench.missing(variant):
             continue
-        found = bench.after_steps(start, edit.after, variant, settings, STEPS, note)
+        found = bench.after_steps(start, edit.after, variant, settings, STEPS, note, edit.between)
         shown = {f"{variant.slug}-{one.mark.split()[0]}": one.image for one in found}
         rows.append(Row(variant.label, _cells(folder, f"{name}-{base}", shown, truth)))
     sheet = contact_sheet([Block(f"{edit.words}, picture of {base} samples", rows)])

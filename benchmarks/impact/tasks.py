@@ -70,6 +70,7 @@ class _Case:
     after: Scene
     base: int
     variant: Variant
+    between: Scene | None = None
 
     @property
     def label(self) -> str:
@@ -85,6 +86,7 @@ class _Case:
             "measure": measure,
             "scene": digest(self.start.scene),
             "edit": self.edit,
+            "between": None if self.between is None else digest(self.between),
             "edited": digest(self.after),
             "variant": self.variant.label,
             **every,
@@ -118,7 +120,7 @@ def tasks(bench: ImpactBench, plan: Plan) -> list[Task]:
 def _case(bench: ImpactBench, name: str, base: int, variant: Variant) -> _Case:
     edit = EDITS[name]
     start = bench.start(edit.before, edit.stage, base)
-    return _Case(name, edit.words, edit.stage, start, edit.after, base, variant)
+    return _Case(name, edit.words, edit.stage, start, edit.after, base, variant, edit.between)
 
 
 def _at_steps(bench: ImpactBench, plan: Plan, case: _Case) -> Task:
@@ -128,7 +130,9 @@ def _at_steps(bench: ImpactBench, plan: Plan, case: _Case) -> Task:
         if reason := bench.missing(case.variant):
             return Outcome(skipped=reason)
         reference = case.start.reference(case.after, settings, _preparing(work))
-        found = bench.after_steps(case.start, case.after, case.variant, settings, marks, _measuring(work))
+        found = bench.after_steps(
+            case.start, case.after, case.variant, settings, marks, _measuring(work), case.between
+        )
         # Errors at equal paths do not depend on what else the machine does.
         return Outcome(rows=_rows(found, reference), load={})
 
@@ -159,7 +163,14 @@ def _at_seconds(bench: ImpactBench, plan: Plan, case: _Case, turn: int) -> Task:
             return Outcome(skipped=reason)
         reference = case.start.reference(case.after, settings, _preparing(work))
         found, values = bench.after_seconds(
-            case.start, case.after, case.variant, settings, marks, _measuring(work), work.timing_starts
+            case.start,
+            case.after,
+            case.variant,
+            settings,
+            marks,
+            _measuring(work),
+            work.timing_starts,
+            case.between,
         )
         load = work.load()
         return Outcome(values, _rows(found, reference), load=load)

@@ -12,7 +12,7 @@ from support.small_scenes import mixed_scene, small_settings
 
 from incpt.benchmarks.impact import tables
 from incpt.benchmarks.impact.bench import DRAG_VARIANTS, ImpactBench, Purse, Variant, variants
-from incpt.benchmarks.impact.edits import DRAG_STEPS, EDITS, STAGES, drag_step
+from incpt.benchmarks.impact.edits import DRAG_STEPS, EDITS, FIRST_STEPS, STAGES, drag_step
 from incpt.benchmarks.impact.pictures import write_pictures
 from incpt.benchmarks.impact.tasks import Plan
 from incpt.benchmarks.kit.denoise import Denoiser
@@ -57,16 +57,17 @@ def start(bench: ImpactBench) -> EditBench:
 @pytest.mark.parametrize("name", EDITS)
 def test_every_edit_changes_what_is_seen(name: str) -> None:
     edit = EDITS[name]
-    change = diff(edit.before, edit.after)
+    change = diff(edit.between or edit.before, edit.after)
     assert not change.camera and change.is_local != change.is_global
-    assert change.is_global or affected_objects(edit.before, edit.after, change)
+    assert change.is_global or affected_objects(edit.between or edit.before, edit.after, change)
+    assert edit.between is None or diff(edit.before, edit.between).is_local
     assert not (change.is_global and edit.local)
     assert edit.before is edit.before and edit.after is edit.after
 
 
 def test_edits_are_those_of_the_method_and_many_of_other_kinds() -> None:
     names = list(EDITS)
-    assert len(names) == 28
+    assert len(names) == 31
     kinds = set()
     for name in names[15:]:
         change = diff(EDITS[name].before, EDITS[name].after)
@@ -96,6 +97,20 @@ def test_a_drag_ends_after_its_steps() -> None:
 
 
 # --------------------------------------------------------------------------------------- equal paths
+
+
+@pytest.mark.slow
+def test_a_first_edit_is_made_and_rendered_before(bench: ImpactBench, start: EditBench) -> None:
+    first = SCENE.with_object("red cube", position=(0.1, 0.5, 0.2))
+    (shown,) = bench.after_steps(start, AFTER, IMPACT, SETTINGS, (1,), nothing, first)
+    session = start.at(start.start(IMPACT.settings(SETTINGS), nothing))
+    session.edit(first)
+    Purse(session).spend(FIRST_STEPS)
+    session.edit(AFTER)
+    Purse(session).spend(1)
+    np.testing.assert_array_equal(shown.image, session.image())
+    (alone,) = bench.after_steps(start, AFTER, IMPACT, SETTINGS, (1,), nothing)
+    assert not np.array_equal(shown.image, alone.image)
 
 
 @pytest.mark.slow
