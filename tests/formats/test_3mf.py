@@ -275,3 +275,13 @@ def test_what_an_archive_unpacks_to_is_bounded(tmp_path: Path, monkeypatch: pyte
         archive.writestr("_rels/.rels", RELATIONSHIPS.replace("3dmodel", "2dmodel"))
     with pytest.raises(InputError, match="names no model"):
         parts_of(path)
+
+
+def test_a_damaged_file_is_closed_at_once(tmp_path: Path) -> None:
+    """Though what was being read of it is held by the error."""
+    path = tmp_path / "a.3mf"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("_rels/.rels", "<a><b>" + "x" * (3 << 20))
+    with pytest.raises(InputError), package.Package(path) as damaged:
+        damaged.model()
+    assert damaged._file.closed

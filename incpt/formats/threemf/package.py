@@ -28,9 +28,12 @@ class Package:
 
     def __init__(self, path: Path) -> None:
         self._left = _ALLOWANCE + MOST_GROWTH * path.stat().st_size
+        # An archive leaves its file open as long as anybody may read on in one of its parts.
+        self._file = path.open("rb")
         try:
-            self._archive = zipfile.ZipFile(path)
+            self._archive = zipfile.ZipFile(self._file)
         except Exception as error:  # zipfile raises errors of many types for damaged files.
+            self._file.close()
             raise InputError(f"is no 3MF file, or a damaged one ({reason_of(error)})") from None
 
     def __enter__(self) -> Package:
@@ -40,6 +43,7 @@ class Package:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._archive.close()
+        self._file.close()
 
     def pieces(self, name: str) -> Iterator[bytes]:
         """What a part holds, piece by piece. `name` begins with a slash, as those of parts do."""
