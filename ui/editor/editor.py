@@ -395,6 +395,8 @@ class Editor:
         self._before_move = None
         self.select(Selection())
         self.control = replace(self.control, point=None)
+        # Nobody asks what the picture of another document has in common with this one.
+        self.renderer.request(Restart())
         for warning in document.warnings:
             self.say(warning, "warning")
         if opened is not None:

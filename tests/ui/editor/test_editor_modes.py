@@ -340,7 +340,7 @@ def test_a_new_document_starts_over(table: Table, tmp_path: Path) -> None:
 
     path = tmp_path / "other.toml"
     scene_save.save(SCENE.without_object("lamp"), path)
-    mode, _ = mode_after(table, lambda user: files.open_file(user.editor, path))
-    assert mode in (BASE, INCREMENTAL) and table.renderer.view is not None
+    mode, kept = mode_after(table, lambda user: files.open_file(user.editor, path))
+    assert mode is BASE and not kept and table.renderer.view is not None
     table.settle()
     assert table.renderer.session.scene == table.user.scene
