@@ -5,7 +5,7 @@
 // The class of a pixel is the highest bit of its label: 1 where an object changed itself, see
 // impact/guides.cl.
 INLINE uint class_of(uint label) { return label >> 31; }
-// Whether the target is a guess of what a pixel shows, see impact/shrinkage.cl.
+// Whether the target has what a pixel shows: the next bit of its label, see impact/shrinkage.cl.
 INLINE int has_target_at(uint label) { return (int)(label >> 30) & 1; }
 
 // The class of a pixel as factors, of which one is 1 and the other 0. Compilers make choices of places in

@@ -4,7 +4,9 @@
 // The shown picture: a base that is known well, and what stands out of the noise of the change from it.
 //
 // The base is the refined old picture. Where an object changed itself it is less of it, down to nothing, the
-// less its samples go together with the old ones: then the change is all of the new picture.
+// less its samples go together with the old ones: then the change is all of the new picture. After a further
+// edit the base is the picture that was shown before it, the target, where that shows the same: until there
+// are samples nearby, and as long as these meet a change.
 //
 // The change, which the two halves of the samples show independently of each other, is taken apart into
 // details of several scales by guided smoothing passes (a-trous wavelets; Dammertz et al. 2010). Products of

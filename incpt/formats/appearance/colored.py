@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core.affine import Vector
+from incpt.formats import import_report
 from incpt.picture.color import linear_from_srgb
 from incpt.scene.texture import Bitmap, Texture
 
@@ -61,6 +62,16 @@ class Amount:
     @property
     def mean(self) -> float:
         return self.value if self.image is None else float(self.image.pixels.mean())
+
+
+def as_reflectance(color: Colored, what: str) -> Colored:
+    """The colour held within 0 to 1, which is told of `what`."""
+    if min(color.rgb) >= 0 and max(color.rgb) <= 1:
+        return color
+    listed = ", ".join(f"{c:.4g}" for c in color.rgb)
+    import_report.changed(f"{what}: {listed} is limited to 0 to 1")
+    r, g, b = (min(max(c, 0.0), 1.0) for c in color.rgb)
+    return replace(color, rgb=(r, g, b))
 
 
 def linear_pixels(bitmap: Bitmap) -> Array:

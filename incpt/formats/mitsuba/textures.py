@@ -20,6 +20,7 @@ from incpt.formats.appearance.colored import (
     Array,
     Colored,
     NumberImage,
+    as_reflectance,
     linear_pixels,
     plain_numbers,
     vector,
@@ -51,12 +52,7 @@ class Textures:
         with in_place(name):
             value = node.value(name)
             found = Colored((default,) * 3) if value is None else self._colored(value, reflected_color)
-            if max(found.rgb) > 1 or min(found.rgb) < 0:
-                r, g, b = (min(max(c, 0.0), 1.0) for c in found.rgb)
-                listed = ", ".join(f"{c:.4g}" for c in found.rgb)
-                import_report.changed(f"{name} of {node}: {listed} is limited to 0 to 1")
-                found = replace(found, rgb=(r, g, b))
-            return found
+            return as_reflectance(found, f"{name} of {node}")
 
     def emission(self, node: Node, name: str) -> Colored:
         """The colour of light; 1 where none is given. Raises InputError."""

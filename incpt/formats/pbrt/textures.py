@@ -18,6 +18,7 @@ from incpt.formats.appearance.colored import (
     Array,
     Colored,
     NumberImage,
+    as_reflectance,
     linear_pixels,
     plain_numbers,
     vector,
@@ -48,13 +49,7 @@ class Textures:
 
     def reflectance(self, statement: Statement, name: str, default: float) -> Colored:
         """A colour from 0 to 1. Raises InputError."""
-        found = self._color(statement, name, default)
-        if max(found.rgb) > 1 or min(found.rgb) < 0:
-            listed = ", ".join(f"{c:.4g}" for c in found.rgb)
-            import_report.changed(f"{name} of {statement}: {listed} is limited to 0 to 1")
-            r, g, b = (min(max(c, 0.0), 1.0) for c in found.rgb)
-            found = replace(found, rgb=(r, g, b))
-        return found
+        return as_reflectance(self._color(statement, name, default), f"{name} of {statement}")
 
     def light(self, statement: Statement, name: str) -> Vector:
         """The colour of a light: a spectrum with a luminance of 1, or red, green and blue as they are. Raises

@@ -44,10 +44,10 @@ class Target:
         if camera.has_lens:
             reach += exploration.most_blur(grid, camera, affected(self.hits.scene, now.scene))
         found = self.image[..., 3] > 0
-        whole = (
-            [(0, 0, grid.width, grid.height)] if SURROUNDINGS in touched(self.hits.scene, now.scene) else []
-        )
-        for window in whole or self.windows(now.scene, grid):
+        windows = self.windows(now.scene, grid)
+        if SURROUNDINGS in touched(self.hits.scene, now.scene):  # They may be seen anywhere.
+            windows = [(0, 0, grid.width, grid.height)]
+        for window in windows:
             inside = rows_columns(_grown(window, reach, grid))
             found[inside] &= ~widened(~self.hits.stays(now, inside), reach)
         return found
