@@ -34,9 +34,9 @@ LEAST_SHARE = 1e-3
 """The least variance of a tile, over the mean of all: no tile is left without samples for ever, since what
 was never seen there cannot have been measured."""
 _LEAST_SAMPLES = 1e-6
-_GAIN_SPAN, _LEVEL_STEPS, _SAMPLE_STEPS = 40.0, 24, 10
-"""By how much gains are searched below the highest, in powers of e, and steps of bisection for gains and for
-samples, which lie within a factor of two."""
+_GAIN_SPAN, _LEVEL_STEPS, _SAMPLE_STEPS = 40.0, 16, 4
+"""By how much gains are searched below the highest, in powers of e; steps of bisection for gains, which leave
+0.03 % of the samples open, and of Newton's method for samples, which leave less than 1 %."""
 _UNKNOWN_TOUCHED = 0.3
 """The share of paths that have a partner, while no path of a tile is there."""
 
@@ -155,16 +155,20 @@ def _levelled(tiles: TileVariances, pixels: FloatArray, budget: float) -> FloatA
 
 
 def _samples_at(tiles: TileVariances, gain: float) -> FloatArray:
-    """(tiles,) the samples at which the gain has come down to that, by bisection between two bounds."""
+    """(tiles,) the samples at which the gain has come down to that.
+
+    By Newton's method for gain^(-1/2), which is linear in the samples where only one of both terms counts and
+    concave everywhere: from below it comes closer with each step, and never goes beyond."""
     alone = np.sqrt(tiles.uncorrelated / (tiles.cost * gain))
     refined = np.sqrt(tiles.correlated / (tiles.cost * gain)) - tiles.kept
-    low = np.maximum(np.maximum(alone, refined), _LEAST_SAMPLES)
-    high = np.maximum(alone + np.maximum(refined, 0), low)
+    samples = np.maximum(np.maximum(alone, refined), _LEAST_SAMPLES)
     for _ in range(_SAMPLE_STEPS):
-        middle = 0.5 * (low + high)
-        too_few = tiles.gain(middle) > gain
-        low, high = np.where(too_few, middle, low), np.where(too_few, high, middle)
-    return np.asarray(0.5 * (low + high))
+        own, all_samples = 1 / samples, 1 / (tiles.kept + samples)
+        of_own, of_all = tiles.uncorrelated * own**2, tiles.correlated * all_samples**2
+        there = (of_own + of_all) / tiles.cost
+        slope = (of_own * own + of_all * all_samples) / tiles.cost
+        samples = samples + there * (np.sqrt(there / gain) - 1) / slope
+    return samples
 
 
 def _smoothed(values: FloatArray, columns: int) -> FloatArray:

@@ -62,6 +62,29 @@ def test_tiles_that_get_samples_end_level_and_the_budget_is_spent() -> None:
     np.testing.assert_allclose(gains, gains.mean(), rtol=0.02)
 
 
+def test_tiles_end_level_whatever_their_variances() -> None:
+    random = np.random.default_rng(1)
+    count = 4000
+    uncorrelated, correlated = 10 ** random.uniform(-6, 2, (2, count))
+    correlated[: count // 5] = 0
+    tiles = TileVariances(
+        uncorrelated,
+        correlated,
+        singles=np.zeros(count, np.bool_),
+        cost=random.uniform(1, 2, count),
+        samples=np.ones(count),
+        kept=10 ** random.uniform(0, 4, count),
+    )
+    pixels = np.full(count, PIXELS)
+    budget = 1e5 * float(pixels.sum())
+    granted = allocate(tiles, pixels, budget, random).samples.astype(float)
+    many = granted > 1000  # so that it does not matter how they are rounded
+    assert many.sum() > 1000
+    gains = tiles.gain(tiles.samples + granted)[many]
+    assert np.sqrt(gains / np.median(gains)) == pytest.approx(1, abs=0.01)
+    assert (granted * tiles.cost * pixels).sum() == pytest.approx(budget, rel=0.01)
+
+
 def test_what_is_correlated_is_refined_only_beside_what_the_old_picture_knows() -> None:
     # The same noise: one tile starts over, in the other the old picture has a thousand samples.
     tiles = apart(measured(1.0, 0.0, 4), measured(1.0, 0.999, 4, kept=1000.0))
