@@ -547,7 +547,7 @@ KERNELS: dict[str, tuple[Group, ...]] = {
         *(PICTURE, PAIRS, LABELS, GUIDES, SPANS, BASE, DETAILS, EVIDENCE, COLUMN_EVIDENCE),
         *(SHOWN_IMAGE, SHOWN_SHARES),
     ),
-    "fold_change": (PICTURE, PAIRS, LABELS, CELLS, SHOWN_IMAGE),
+    "fold_change": (PICTURE, PAIRS, LABELS, CELLS, SHOWN_IMAGE, SHOWN_SHARES),
     "bound_faces": (ITEMS, MESH, BOXES),
     "measure_chunks": (ITEMS, BOXES, CHUNKS, MEASURES),
     "bin_chunks": (ITEMS, BOXES, CHUNKS, BINS),

@@ -443,14 +443,16 @@ def tent(cells: Array) -> Array:
     return sum(p * padded[i : i + rows, j : j + columns] for i, j, p in parts) / (4 * CELL_SIZE**2)
 
 
-def worth(state: State, about: list[Known], changed: npt.NDArray[np.bool_]) -> Array:
+def worth(state: State, guides: Guides) -> Array:
     """(H, W) samples that the shown picture is worth."""
+    about = known(state, guides.changed)
+    shown = np.clip(2 * picture_and_shares(state, guides)[1], 0.03, 1)
     samples, refined = state.samples.sum(0), state.kept + state.pairs.sum(0)
     shares = []
     for one in about:
         variance = (one.freedom_new * one.new_variance + one.new_moment) / (one.freedom_new + 1)
         correlation = one.covariance**2 / np.maximum(variance * one.old_variance, 1e-300)
         shares.append(np.where(one.touched > 0, np.minimum(correlation, 1), 1))
-    kept_share = to_pixels(shares, changed, interpolated=False)
-    per_worth = (1 - kept_share) / np.maximum(samples, 1) + kept_share / np.maximum(refined, 1e-20)
+    kept_share = to_pixels(shares, guides.changed, interpolated=False)
+    per_worth = (1 - kept_share) * shown / np.maximum(samples, 1) + kept_share / np.maximum(refined, 1e-20)
     return np.where(samples > 0, 1 / per_worth, state.kept)

@@ -270,15 +270,15 @@ def test_folding_keeps_the_picture_and_its_worth(device: Device) -> None:
     sums = rig.film.sums()
     assert not sums[PAIR_SUMS.name].any()
     about = reference.known(state, edit.guides.changed)
-    expected = reference.worth(state, about, edit.guides.changed)
-    np.testing.assert_allclose(sums[RADIANCE.name][3], expected, rtol=2e-3)
+    expected = reference.worth(state, edit.guides)
+    np.testing.assert_allclose(sums[RADIANCE.name][3], expected, rtol=1e-2)
     np.testing.assert_allclose(rig.film.image()[..., :3], shown, atol=1e-5)
     untouched = ~reference.touched_around(about, edit.guides.changed)
     assert untouched.any()
     np.testing.assert_allclose(expected[untouched], made_up.KEPT + 3)
-    assert (
-        expected[edit.touched == 1].max() < made_up.KEPT
-    )  # what changed is worth little more than its samples
+    # What changed is worth more than its samples where less than half of their noise is shown, but not much.
+    changed = expected[edit.touched == 1]
+    assert changed.min() >= 3 and 4 < np.median(changed) < made_up.KEPT
 
 
 def test_folding_without_samples_changes_nothing(device: Device) -> None:
@@ -352,8 +352,8 @@ def test_groups_of_work_items_make_the_same_picture(
     samples = np.bincount(grid.tile_of_pixels().ravel(), state.samples.sum(0).ravel(), grid.count)
     np.testing.assert_array_equal(sums.samples, samples)
     rig.fold()
-    expected = reference.worth(state, reference.known(state, edit.guides.changed), edit.guides.changed)
-    np.testing.assert_allclose(rig.film.sums()[RADIANCE.name][3], expected, rtol=2e-3)
+    expected = reference.worth(state, edit.guides)
+    np.testing.assert_allclose(rig.film.sums()[RADIANCE.name][3], expected, rtol=1e-2)
 
 
 def with_target(edit: made_up.Edit, rng: np.random.Generator) -> reference.Guides:
