@@ -5,9 +5,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
+
+from incpt.core import affine
+from incpt.core.errors import InputError
+from incpt.formats import import_report
+from incpt.scene.environment import Environment
+from incpt.scene.image import Image
 
 Array = npt.NDArray[np.float64]
 Pixels = npt.NDArray[np.float32]
@@ -51,3 +58,18 @@ def seen_along(pixels: Pixels, ways: Array) -> Pixels:
     below = (1 - right_share) * pixels[m, i] + right_share * pixels[m, k]
     seen: Pixels = ((1 - down_share) * above + down_share * below).astype(np.float32)
     return seen
+
+
+def turned_environment(what: str, environment: Environment, turn: Array) -> Environment:
+    """An environment whose image or sky is turned by a matrix (3, 3), whose columns may have any length:
+    about y as it is, otherwise with a new image, which is told of `what`. Raises InputError."""
+    if not abs(np.linalg.det(turn)) > 0:
+        raise InputError("its placement flattens space")
+    turn = turn / np.linalg.norm(turn, axis=0)
+    angle = math.degrees(math.atan2(turn[0, 2], turn[2, 2]))
+    if np.allclose(turn, affine.rotation_matrix((0.0, angle, 0.0)), atol=1e-5):
+        return replace(environment, rotation_y=angle)
+    picture = environment.picture
+    assert picture is not None
+    import_report.changed(f"{what}: is turned off the y axis, for which its image is made anew")
+    return replace(environment, image=Image(turned(picture.pixels, turn)), sky=None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +11,7 @@ import numpy.typing as npt
 from incpt.core.checks import one_of
 from incpt.core.errors import in_place
 from incpt.formats import import_report
+from incpt.formats.camera_placement import placement, tell_of_far_plane
 from incpt.formats.gltf.document import Document
 from incpt.formats.gltf.nodes import Node
 from incpt.scene.camera import Camera
@@ -32,13 +34,7 @@ def camera_of(node: Node, document: Document, bounds: npt.NDArray[np.floating]) 
         kind = table.text("type")
         one_of("type", kind, ("perspective", "orthographic"))
         lens = table.table(kind)
-        back, up = (node.world[:3, axis] / np.linalg.norm(node.world[:3, axis]) for axis in (2, 1))
-        position = node.world[:3, 3]
-        # In the middle of what there is to see, so that a view turns about it.
-        distance = float((bounds.mean(axis=0) - position) @ -back)
-        if distance <= 1e-3 * float(np.linalg.norm(bounds[1] - bounds[0])):
-            distance = max(float(np.linalg.norm(bounds[1] - bounds[0])) / 2, 1e-3)
-        values = {"projection": kind, "near": max(lens.number("znear", 0.0), 0.0)}
+        values: dict[str, Any] = {"projection": kind, "near": max(lens.number("znear", 0.0), 0.0)}
         if kind == "perspective":
             angle = math.degrees(lens.number("yfov", math.radians(40), 1e-3))
             if angle > _LARGEST_FOV_Y:
@@ -49,14 +45,5 @@ def camera_of(node: Node, document: Document, bounds: npt.NDArray[np.floating]) 
         else:
             # `xmag` is the picture's own aspect here, as `aspectRatio` is.
             values["ortho_height"] = 2 * max(abs(lens.number("ymag", 1.0)), 1e-6)
-        _tell_of_far_plane(lens.number("zfar", math.inf, high=math.inf), node, bounds, name)
-        where, target = tuple(position.tolist()), tuple((position - distance * back).tolist())
-        return name, Camera(where, target, tuple(up.tolist()), **values)  # type: ignore[arg-type]
-
-
-def _tell_of_far_plane(far: float, node: Node, bounds: npt.NDArray[np.floating], name: str) -> None:
-    """What stands behind a camera's far plane is seen here."""
-    corners = np.array([[bounds[(i >> axis) & 1][axis] for axis in range(3)] for i in range(8)])
-    depth = -(corners - node.world[:3, 3]) @ node.world[:3, 2] / np.linalg.norm(node.world[:3, 2])
-    if depth.max() > far:
-        import_report.left_out(f"the far plane of camera {name!r}: what is behind it is seen")
+        tell_of_far_plane(lens.number("zfar", math.inf, high=math.inf), node.world, bounds, name)
+        return name, Camera(**placement(node.world, bounds), **values)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -12,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core import affine
 from incpt.core.errors import InputError
 from incpt.formats import import_report
 from incpt.formats.clean import tell_of_faces, usable_mesh
@@ -31,14 +28,12 @@ from incpt.formats.import_options import current_options
 from incpt.formats.import_report import counted
 from incpt.formats.names import Names
 from incpt.formats.placement import placed_arrays, transform_of
+from incpt.formats.shared_meshes import MOST_PARTS, bounds_of, with_sources
 from incpt.scene.camera import Camera
 from incpt.scene.mesh import Mesh, MeshSource
 from incpt.scene.mesh_part import MeshFile, MeshPart
 from incpt.scene.model import CAMERA_NAME
 from incpt.scene.transform import IDENTITY
-
-MOST_PARTS = 1_000_000
-"""Meshes at places that a file may show: a small file can name a great many, each of many parts."""
 
 
 def read_gltf(path: Path) -> MeshFile:
@@ -50,7 +45,7 @@ def read_gltf(path: Path) -> MeshFile:
     nodes = Nodes(document)
     in_scene = nodes.in_scene()
     parts = _Parts(document, accessors, nodes).of(in_scene)
-    bounds = _bounds(parts)
+    bounds = bounds_of(parts)
     lights = tuple(light for node in in_scene if (light := light_of(node, document)) is not None)
     if lights:
         factor = "" if watts_of(document) == 1 else ", 683 of them for one, as Blender's exporter has them"
@@ -75,14 +70,6 @@ def _tell_of_variants(document: Document) -> None:
     if names:
         listed = ", ".join(map(repr, names[:8])) + (", …" if len(names) > 8 else "")
         import_report.left_out(f"variants of materials ({listed}): the default is used")
-
-
-def _bounds(parts: Sequence[MeshPart]) -> npt.NDArray[np.float64]:
-    """(2, 3) bounds of all parts in the space of the file."""
-    corners = np.concatenate(
-        [affine.apply(p.transform.world_from_object, affine.box_corners(p.mesh.bounds)) for p in parts]
-    )
-    return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,21 +111,7 @@ class _Parts:
         tell_of_faces(self._counts)
         if len(placed) == 1:
             parts = [replace(parts[0], name=None)]
-        return self._with_sources(parts)
-
-    def _with_sources(self, parts: Sequence[MeshPart]) -> tuple[MeshPart, ...]:
-        """The parts with meshes that know their place in the file. A mesh that only one part shows, where it
-        is stored, is that part of the file; others are geometries of it."""
-        file = os.path.abspath(self._document.path)
-        uses = Counter(id(part.mesh) for part in parts)
-        made: dict[int, Mesh] = {}
-        for part in parts:
-            mesh = part.mesh
-            if id(mesh) not in made:
-                is_part = uses[id(mesh)] == 1 and part.transform == IDENTITY
-                source = MeshSource(file=file, part=part.name) if is_part else replace(mesh.source, file=file)
-                made[id(mesh)] = replace(mesh, source=source)
-        return tuple(replace(part, mesh=made[id(part.mesh)]) for part in parts)
+        return with_sources(self._document.path, parts)
 
     def _placed(self, node: Node) -> Iterator[_Placed]:
         """Every primitive that has area of the mesh of a node, at each place where the node shows it."""

@@ -9,19 +9,17 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from incpt.core import affine
 from incpt.core.affine import Vector
 from incpt.core.errors import InputError, in_place
 from incpt.formats import images, import_report
 from incpt.formats.appearance.colored import linear_pixels
-from incpt.formats.lat_long import turned
+from incpt.formats.lat_long import turned_environment
 from incpt.formats.mitsuba.document import Document
 from incpt.formats.mitsuba.node import Node
 from incpt.formats.mitsuba.textures import Textures
 from incpt.formats.names import Names
 from incpt.picture.spectra import LUMINANCE_INTEGRAL
 from incpt.scene.environment import Environment
-from incpt.scene.image import Image
 from incpt.scene.light import Light
 from incpt.scene.sky import Sky
 
@@ -115,7 +113,9 @@ class Emitters:
         except InputError as error:
             import_report.left_out(f"{node}: {error}")
             return
-        self._surround(node, _turned(node, Environment((1.0, 1.0, 1.0), image, intensity=scale), turn))
+        self._surround(
+            node, turned_environment(str(node), Environment((1.0, 1.0, 1.0), image, intensity=scale), turn)
+        )
 
     def sunsky(self, node: Node) -> None:
         """A clear sky of another model, with its sun where it is told. Ours is in W / (m² sr) for red, green
@@ -144,7 +144,9 @@ class Emitters:
         ahead = sun - (sun @ up) * up
         ahead = ahead / np.linalg.norm(ahead) if np.linalg.norm(ahead) > _SAME else _across(up)
         frame = np.column_stack([np.cross(up, ahead), up, ahead])
-        self._surround(node, _turned(node, Environment((1.0, 1.0, 1.0), sky=sky, intensity=scale), frame))
+        self._surround(
+            node, turned_environment(str(node), Environment((1.0, 1.0, 1.0), sky=sky, intensity=scale), frame)
+        )
         irradiance = np.array(replace(sky, sun_disc=True).sun_irradiance)
         irradiance *= node.number("sun_scale", 1.0, 0.0) / LUMINANCE_INTEGRAL
         if irradiance.max() > 0:
@@ -193,18 +195,3 @@ def _sun(name: str, direction: Array, irradiance: Vector, angle: float = 0.0) ->
     across = _across(direction)
     axes = np.column_stack([across, np.cross(-direction, across), -direction, np.zeros(3)])
     return Light(name, "sun", matrix=axes, color=irradiance, irradiance=1.0, angle=angle)
-
-
-def _turned(node: Node, environment: Environment, turn: Array) -> Environment:
-    """An environment whose image is turned by a matrix (3, 3): about y as it is, otherwise with a new
-    image."""
-    if not abs(np.linalg.det(turn)) > 0:
-        raise InputError("to_world: flattens space")
-    turn = turn / np.linalg.norm(turn, axis=0)
-    angle = math.degrees(math.atan2(turn[0, 2], turn[2, 2]))
-    if np.allclose(turn, affine.rotation_matrix((0.0, angle, 0.0)), atol=1e-5):
-        return replace(environment, rotation_y=angle)
-    picture = environment.picture
-    assert picture is not None
-    import_report.changed(f"{node}: is turned off the y axis, for which its image is made anew")
-    return replace(environment, image=Image(turned(picture.pixels, turn)), sky=None)

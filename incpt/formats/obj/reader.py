@@ -23,6 +23,7 @@ from incpt.formats.obj.lines import IMPOSSIBLE, NOWHERE, ObjText, State, decoded
 from incpt.formats.obj.mtl import MaterialLibrary
 from incpt.formats.outside import check_inside
 from incpt.formats.polygons import triangulated
+from incpt.formats.smooth_normals import smooth_normals
 from incpt.formats.vertex_attributes import VertexAttributes, material_of_colors
 from incpt.picture.color import linear_from_srgb
 from incpt.scene.material import Material
@@ -117,8 +118,7 @@ class _Triangles:
 
 def _smoothed(text: ObjText, triangles: _Triangles) -> Array:
     """(N, 3) the normals of the file, and behind them those of smoothing groups, which triangles get that
-    have none of their own: at each vertex of a group the mean over its faces there, weighted by their angles
-    (Thürmer and Wüthrich, "Computing Vertex Normals from Polygonal Facets", JGT 1998)."""
+    have none of their own."""
     group = np.array([run.state.smoothing for run in text.runs], np.int64)[triangles.run]
     usable = (triangles.positions >= 0).all(axis=1)
     (chosen,) = np.nonzero((group > 0) & (triangles.normals == NOWHERE).any(axis=1) & usable)
@@ -128,17 +128,7 @@ def _smoothed(text: ObjText, triangles: _Triangles) -> Array:
     keys, place = np.unique(
         faces.astype(np.int64) * (group.max() + 1) + group[chosen][:, None], return_inverse=True
     )
-    corners = text.vertices[faces]
-    sums = np.zeros((len(keys), 3))
-    with np.errstate(all="ignore"):
-        along = np.roll(corners, -1, axis=1) - corners
-        along /= np.linalg.norm(along, axis=2, keepdims=True)
-        flat = np.cross(along[:, 0], along[:, 1])
-        flat /= np.linalg.norm(flat, axis=1, keepdims=True)
-        cosines = -(along * np.roll(along, 1, axis=1)).sum(axis=2)
-        weighted = np.nan_to_num(np.arccos(np.clip(cosines, -1, 1))[..., None] * flat[:, None, :])
-    for axis in range(3):
-        sums[:, axis] = np.bincount(place.ravel(), weighted[..., axis].ravel(), len(keys))
+    sums = smooth_normals(text.vertices[faces], place.reshape(-1, 3), len(keys))
     own = triangles.normals[chosen]
     triangles.normals[chosen] = np.where(own == NOWHERE, len(text.normals) + place.reshape(-1, 3), own)
     return np.concatenate([text.normals, sums])

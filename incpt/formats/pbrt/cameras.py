@@ -12,6 +12,7 @@ import numpy.typing as npt
 from incpt.core.errors import InputError, in_place
 from incpt.core.settings import MAX_IMAGE_PIXELS
 from incpt.formats import import_report
+from incpt.formats.camera_placement import viewing_distance
 from incpt.formats.pbrt.document import Document, Placed
 from incpt.formats.pbrt.parameters import Statement
 from incpt.scene.camera import Camera
@@ -75,7 +76,7 @@ def camera_of(document: Document, world: Array, bounds: Array) -> tuple[Camera, 
             values["fov_y"] = math.degrees(2 * math.atan(tangent * height / 2))
         else:
             values["ortho_height"] = height * float(np.linalg.norm(up))
-        distance = _distance(position, forward / np.linalg.norm(forward), bounds)
+        distance = viewing_distance(position, forward / np.linalg.norm(forward), bounds)
         where = tuple(position.tolist())
         target = tuple((position + distance * forward / np.linalg.norm(forward)).tolist())
         camera = Camera(where, target, tuple(up.tolist()), **values)
@@ -92,13 +93,6 @@ def _screen(statement: Statement, size: tuple[int, int]) -> tuple[float, float, 
             raise InputError("screenwindow: has no area; write x from, x to, y from, y to")
         return low_x, high_x, low_y, high_y
     return (-aspect, aspect, -1.0, 1.0) if aspect > 1 else (-1.0, 1.0, -1 / aspect, 1 / aspect)
-
-
-def _distance(position: Array, forward: Array, bounds: Array) -> float:
-    """To the middle of what there is to see, so that a view turns about it."""
-    size = float(np.linalg.norm(bounds[1] - bounds[0]))
-    distance = float((bounds.mean(axis=0) - position) @ forward)
-    return distance if distance > 1e-3 * size else max(size / 2, 1e-3)
 
 
 def _with_lens(placed: Placed, camera: Camera, aspect: float) -> Camera:

@@ -1,0 +1,44 @@
+"""Parts of mesh files that share their meshes: what each mesh is called in its file, and where all stand."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from incpt.core import affine
+from incpt.scene.mesh import Mesh, MeshSource
+from incpt.scene.mesh_part import MeshPart
+from incpt.scene.transform import IDENTITY
+
+MOST_PARTS = 1_000_000
+"""Meshes at places that a file may show: a small file can name a great many, each of many parts."""
+
+
+def with_sources(path: Path, parts: Sequence[MeshPart]) -> tuple[MeshPart, ...]:
+    """The parts of a file with meshes that know their place in it; before, their sources have the names of
+    geometries. A mesh that only one part shows, where it is stored, is that part of the file; others are
+    geometries of it."""
+    file = os.path.abspath(path)
+    uses = Counter(id(part.mesh) for part in parts)
+    made: dict[int, Mesh] = {}
+    for part in parts:
+        mesh = part.mesh
+        if id(mesh) not in made:
+            is_part = uses[id(mesh)] == 1 and part.transform == IDENTITY
+            source = MeshSource(file=file, part=part.name) if is_part else replace(mesh.source, file=file)
+            made[id(mesh)] = replace(mesh, source=source)
+    return tuple(replace(part, mesh=made[id(part.mesh)]) for part in parts)
+
+
+def bounds_of(parts: Sequence[MeshPart]) -> npt.NDArray[np.float64]:
+    """(2, 3) bounds of all parts, one or more, in the space of the file."""
+    corners = np.concatenate(
+        [affine.apply(p.transform.world_from_object, affine.box_corners(p.mesh.bounds)) for p in parts]
+    )
+    return np.stack([corners.min(axis=0), corners.max(axis=0)])
