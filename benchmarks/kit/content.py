@@ -22,7 +22,7 @@ _NOT_CONTENT = ("source", "settings")
 
 _MEASURED = (
     "core", "picture", "scene", "formats", "formats.appearance", "formats.gltf", "formats.gltf_writer",
-    "formats.mitsuba", "formats.obj", "formats.pbrt", "formats.ply", "formats.threemf",
+    "formats.mitsuba", "formats.obj", "formats.pbrt", "formats.ply", "formats.threemf", "formats.usd",
     "device", "accel", "tables",
     "render", "render.impact", "viewer",
 )  # fmt: skip

@@ -18,12 +18,11 @@ _READERS = {
     "off": "by a reader of our own",
     "threemf.reader": "by a reader of our own",
     "trimesh_adapter": "by trimesh",
+    "usd.reader": "Universal Scene Description, by its own library",
     "mesh_store": "meshes that incpt itself writes beside a scene file",
     "images": "environments and, in scene files, textures",
     "scene_toml": "[scene files](scene-file.md)",
 }
-_NEEDS = {"collada": "pycollada"}
-"""Distributions by their modules, where the names differ."""
 
 
 def readable() -> str:
@@ -31,8 +30,8 @@ def readable() -> str:
     rows = []
     for kind in FileKind:
         for row in (row for row in registry.FORMATS if row.kind is kind):
-            needs = ", ".join(code(_NEEDS.get(name, name)) for name in row.needs)
-            rows.append((code(row.suffix), kind.value, _READERS[row.reader[0]], needs or "–"))
+            needs = code(row.package) if row.package else "–"
+            rows.append((code(row.suffix), kind.value, _READERS[row.reader[0]], needs))
     return table(("suffix", "holds", "read as", "needs as well"), rows)
 
 

@@ -29,7 +29,7 @@ BouncesOption = Annotated[
 ]
 
 TimeOption = Annotated[
-    float | None, typer.Option("--time", help="Seconds into the animations of glTF files.", min=0)
+    float | None, typer.Option("--time", help="Seconds into the animations of glTF and USD files.", min=0)
 ]
 StrictOption = Annotated[
     bool, typer.Option("--strict", help="Refuse files of which anything has to be left out.")

@@ -22,6 +22,7 @@ from incpt.core.errors import InputError, in_place, one_line
 from incpt.core.files import check_readable, write_atomically
 from incpt.formats import basis
 from incpt.formats.images import muted
+from incpt.formats.usd import archive
 from incpt.scene.texture import BITMAP_MAX_SIZE, Bitmap, BitmapSource
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".tga", ".bmp", ".hdr", ".exr")
@@ -34,7 +35,7 @@ _bitmaps: weakref.WeakValueDictionary[_FileKey, Bitmap] = weakref.WeakValueDicti
 
 def load_bitmap(path: str | os.PathLike[str], index: int | None = None) -> Bitmap:
     """Reads an image for textures: 8 and 16 bits as they are, what has more as floats. `index`: one of the
-    images of a glTF file, by number.
+    images of a glTF file, or of the files of a .usdz archive, by number.
 
     The same file, unchanged, gives the same Bitmap as long as that is in use. Raises InputError, one line
     that names the file: it is missing, damaged, of an unknown type, or too large.
@@ -45,11 +46,19 @@ def load_bitmap(path: str | os.PathLike[str], index: int | None = None) -> Bitma
     with in_place(str(path)):
         if index is None:
             return _known_or(path, None, lambda: read_pixels(path))
-        # It reads images by this module.
-        from incpt.formats.gltf.textures import embedded_image
-
         number = index
-        return embedded(path, number, lambda: embedded_image(path, number))
+        return embedded(path, number, lambda: image_within(path, number))
+
+
+def image_within(path: Path, number: int) -> tuple[bytes, str]:
+    """The content of an image within a file, by its number, and the suffix of such files. Raises
+    InputError."""
+    # They read images by this module.
+    if path.suffix.lower() == archive.SUFFIX:
+        return archive.image_in(path, number)
+    from incpt.formats.gltf.textures import embedded_image
+
+    return embedded_image(path, number)
 
 
 def embedded(path: Path, index: int, content: Callable[[], tuple[bytes, str]]) -> Bitmap:

@@ -26,7 +26,11 @@ def add_mesh(
     file is told by InputWarnings, also its lights and cameras. Raises InputError."""
     file = mesh_files.load_file(path)
     with import_report.in_file(str(path)):
-        for what, count in (("lights", len(file.lights)), ("cameras", len(file.cameras))):
+        for what, count in (
+            ("lights", len(file.lights)),
+            ("cameras", len(file.cameras)),
+            ("environment", int(file.environment is not None)),
+        ):
             if count:
                 import_report.left_out(f"{count} {what}: open the file by itself to have them")
     return edits.add_parts(scene, file.parts, Path(path).stem, at, material)

@@ -22,9 +22,9 @@ from incpt.scene.model import CAMERA_NAME, Object, Scene
 
 
 def scene_around(path: Path) -> Scene:
-    """The meshes of a file with their materials (grey where it has none), its lights and its cameras, as they
-    are. Without a camera one frames them from the front right and above; without a light they stand in a
-    studio. Raises InputError."""
+    """The meshes of a file with their materials (grey where it has none), its lights, its environment and
+    its cameras, as they are. Without a camera one frames them from the front right and above; without a light
+    they stand in a studio. Raises InputError."""
     file = mesh_files.load_file(path)
     row = registry.format_of(path, FileKind.MESH)
     with in_place(str(path)):
@@ -41,9 +41,14 @@ def scene_around(path: Path) -> Scene:
         cameras = dict(file.cameras) or {CAMERA_NAME: _framing_camera(*_bounds(objects))}
         active = next(iter(cameras))
         is_lit = any(light.is_emissive for light in file.lights)
-        environment = Environment((0.0, 0.0, 0.0)) if is_lit else _pleasant_environment()
+        dark_or_studio = Environment((0.0, 0.0, 0.0)) if is_lit else _pleasant_environment()
         scene = Scene(
-            cameras[active], environment, materials, tuple(objects), camera_name=active, cameras=cameras
+            cameras[active],
+            file.environment or dark_or_studio,
+            materials,
+            tuple(objects),
+            camera_name=active,
+            cameras=cameras,
         )
         for light in file.lights:
             name = unique_name(f"{path.stem}/{light.name}", scene.names)

@@ -40,14 +40,15 @@ class Format:
 
     `reader` is the module in this folder and the function in it that takes the path of a readable file and
     returns what the kind says; what it raises as InputError does not name the file, which `read` does.
-    `needs` are modules that the reader uses and an installation may lack. `says_units`: such files say where
-    up is and what their unit is.
+    `needs` are modules that the reader uses and an installation may lack, and `package` is what brings them.
+    `says_units`: such files say where up is and what their unit is.
     """
 
     suffix: str
     kind: FileKind
     reader: tuple[str, str]
     needs: tuple[str, ...] = ()
+    package: str = ""
     says_units: bool = False
 
     @property
@@ -66,6 +67,7 @@ class Format:
 OPENEXR = Format(".exr", FileKind.IMAGE, ("images", "read_exr"))
 _OTHER_IMAGES = (".hdr", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
 _GLTF = ("gltf.reader", "read_gltf")
+_USD = ("usd.reader", "read_usd")
 _TRIMESH = ("trimesh_adapter", "read_with_trimesh")
 FORMATS = (
     Format(".toml", FileKind.SCENE, ("scene_toml", "load_scene_toml")),
@@ -80,7 +82,11 @@ FORMATS = (
     Format(".ply", FileKind.MESH, ("ply.reader", "read_ply")),
     Format(".stl", FileKind.MESH, ("stl", "read_stl")),
     Format(".3mf", FileKind.MESH, ("threemf.reader", "read_3mf"), says_units=True),
-    Format(".dae", FileKind.MESH, _TRIMESH, needs=("collada",)),
+    Format(".dae", FileKind.MESH, _TRIMESH, needs=("collada",), package="pycollada"),
+    *(
+        Format(suffix, FileKind.MESH, _USD, needs=("pxr",), package="incpt[usd]", says_units=True)
+        for suffix in (".usd", ".usda", ".usdc", ".usdz")
+    ),
     Format(".npz", FileKind.MESH, ("mesh_store", "read_stored"), says_units=True),
 )
 """All formats, in the order in which messages list them."""
@@ -103,6 +109,12 @@ def format_of(path: str | os.PathLike[str], *kinds: FileKind) -> Format | None:
     return next(rows, None)
 
 
+def lacking(path: Path) -> str:
+    """What a file cannot be read without, as the end of a message; nothing where that is not it."""
+    rows = (row for row in FORMATS if row.suffix == path.suffix.lower() and not row.is_available)
+    return next((f' without a library; run: pip install "{row.package}"' for row in rows), "")
+
+
 def load(
     path: str | os.PathLike[str],
     *,
@@ -114,8 +126,8 @@ def load(
 ) -> Scene:
     """A scene from a scene file (.toml, .xml of Mitsuba, .pbrt), or a default scene around a mesh file.
 
-    `time`: seconds into the animations of its files; None leaves them out. `allow_outside`: a glTF file may
-    name files outside its own folder. `up` ("y" or "z") and `unit` (metres) say how a mesh file is meant
+    `time`: seconds into the animations of its files; None leaves them out. `allow_outside`: files may
+    name others outside their own folders. `up` ("y" or "z") and `unit` (metres) say how a mesh file is meant
     whose format does not say it (OBJ, PLY, STL ...). `allow_missing`: cubes and single colours stand for
     meshes and images of a scene file that cannot be read. InputWarnings tell of all that was left out, and
     of a scene that shows nothing. Raises InputError, one line that names file, table and key.
@@ -149,6 +161,8 @@ def load_with_report(
     options = ImportOptions(time, allow_outside, up, unit, allow_missing=allow_missing)
     check_readable(path)
     row = format_of(path, FileKind.SCENE, FileKind.MESH)
+    if row is None and (what := lacking(path)):
+        raise InputError(f"{path}: files of this type cannot be read{what}")
     if row is None:
         raise InputError(
             f"{path}: files of this type cannot be read; use a scene ({listed(FileKind.SCENE)}) "

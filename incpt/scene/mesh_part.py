@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from incpt.scene.camera import Camera
+from incpt.scene.environment import Environment
 from incpt.scene.light import Light
 from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh
@@ -30,9 +31,10 @@ class MeshPart:
 class MeshFile:
     """All that a mesh file gives. Names of lights may be alike; `cameras` are in the order of the file.
     `files` are those beside it that it was read from: while they and the file keep their ages and sizes,
-    reading it again gives the same."""
+    reading it again gives the same. `environment` is the light from far away, where a file has it."""
 
     parts: tuple[MeshPart, ...]
     lights: tuple[Light, ...] = ()
     cameras: Mapping[str, Camera] = field(default_factory=dict)
     files: tuple[Path, ...] = ()
+    environment: Environment | None = None

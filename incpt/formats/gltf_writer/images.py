@@ -13,7 +13,6 @@ import numpy as np
 from incpt.core.errors import InputError
 from incpt.core.files import read_bytes
 from incpt.formats import bitmaps, import_report
-from incpt.formats.gltf.textures import embedded_image
 from incpt.formats.gltf_writer.container import Container
 from incpt.picture.color import srgb_from_linear
 from incpt.scene.texture import Bitmap, BitmapSource, Texture
@@ -83,7 +82,7 @@ def _stored(bitmap: Bitmap) -> tuple[bytes, str] | None:
         if source.index is None:
             content, suffix = read_bytes(Path(source.file)), Path(source.file).suffix.lower()
         else:
-            content, suffix = embedded_image(Path(source.file), source.index)
+            content, suffix = bitmaps.image_within(Path(source.file), source.index)
         kind = _KINDS.get(suffix)
         # Names of files say what they like.
         if kind is None or not content.startswith(_BEGINNINGS[kind]):
