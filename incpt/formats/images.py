@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core.arrays import numbers
-from incpt.core.checks import path_of, require
+from incpt.core.checks import described, path_of, require
 from incpt.core.errors import InputError, one_line
 from incpt.core.files import check_readable, write_atomically, write_bytes
 from incpt.core.layout import ENVIRONMENT_MAX_SIZE
@@ -46,9 +46,10 @@ def write_png(
     """Writes a (H, W, 3) picture of linear radiance as 8-bit sRGB, atomically; see `tone_map`. One with the
     shape (H, W, 4) has coverage in its last channel, by which radiance is multiplied already.
 
-    Raises OutputError where the file cannot be written, InputError for an array that is no picture.
+    Raises OutputError where the file cannot be written, InputError for an array that is no picture, and for
+    a name that says another format.
     """
-    path = path_of("path", path)
+    path = _named(path, ".png")
     pixels = tone_map_covered(image, exposure, curve)
     if pixels.ndim != 3 or pixels.size == 0:
         raise InputError(f"image: has shape {pixels.shape}; a picture has shape (height, width, 3 or 4)")
@@ -65,9 +66,10 @@ def write_exr(path: str | os.PathLike[str], layers: Mapping[str, npt.ArrayLike])
     A (H, W) array is one channel under its name ("depth.Z", "object_id"). A (H, W, n) array is n
     channels, named by the last letters of its name: "RGB" is R, G, B and "normal.XYZ" is normal.X,
     normal.Y, normal.Z. uint32 is kept, everything else becomes float32. Raises OutputError where the
-    file cannot be written, InputError for layers that do not fit together.
+    file cannot be written, InputError for layers that do not fit together, and for a name that says another
+    format.
     """
-    path = path_of("path", path)
+    path = _named(path, ".exr")
     require("layers", layers, Mapping, 'a mapping of names to arrays, such as {"RGB": image}')
     channels: dict[str, npt.NDArray[Any]] = {}
     for name, values in layers.items():
@@ -89,6 +91,14 @@ def write_exr(path: str | os.PathLike[str], layers: Mapping[str, npt.ArrayLike])
             raise OSError(one_line(error).replace(str(temporary), path.name)) from None
 
     write_atomically(path, write)
+
+
+def _named(path: str | os.PathLike[str], suffix: str) -> Path:
+    """The path of a file that is to be written. Raises InputError where it ends otherwise."""
+    found = path_of("path", path)
+    if found.suffix.lower() != suffix:
+        raise InputError(f"path: {described(str(path))} does not end in {suffix}, the format that is written")
+    return found
 
 
 def _channels(name: str, values: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:

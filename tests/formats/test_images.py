@@ -221,6 +221,15 @@ def test_png_holds_the_mapped_picture(tmp_path: Path) -> None:
         images.write_png(tmp_path / "b.png", RAMP[0])
 
 
+@pytest.mark.parametrize("name", ["a.tga", "a.png.bak", "a"])
+def test_names_of_other_formats_are_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match=r"path: .* does not end in \.png, the format that is written"):
+        images.write_png(tmp_path / name, RAMP)
+    with pytest.raises(InputError, match=r"path: .* does not end in \.exr, the format that is written"):
+        images.write_exr(tmp_path / name, {"RGB": RAMP})
+    assert not os.listdir(tmp_path)
+
+
 @pytest.mark.parametrize("name", ["a.exr", "a.png"])
 def test_a_folder_that_is_not_there(tmp_path: Path, name: str) -> None:
     def write(path: Path) -> None:
