@@ -21,6 +21,9 @@ _FILTERS = ("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR")
 _MOST_TIMES_LARGER = 2048
 """How many times as large as its code decoded content may be: meshopt's vertex codec needs a byte for 1,024
 zeros at least."""
+_DRACO_HEADER = 11
+"""Bytes of the header of Draco's code, of which the eighth says what is encoded, and the ninth how."""
+_DRACO_MESH, _DRACO_EDGEBREAKER = 1, 1
 
 
 def decoded_view(table: Table, document: Document) -> memoryview:
@@ -51,6 +54,7 @@ def decoded_primitive(
     compressed into `content`; `table` is that of the extension. Raises InputError."""
     with table.in_messages():
         decode = _library("DracoPy", "is compressed by Draco", "DracoPy").decode
+        _check_draco(content)
         mesh = _decoded(lambda: decode(bytes(content)))
         by_number = {attribute["unique_id"]: attribute["data"] for attribute in mesh.attributes}
         names = table.table("attributes")
@@ -64,6 +68,35 @@ def decoded_primitive(
         if faces is None:
             raise InputError("holds points without faces")
         return found, np.asarray(faces, np.int64).reshape(-1, 3)
+
+
+def _check_draco(code: memoryview) -> None:
+    """Raises InputError where a header promises far more than its code can hold, before memory is taken for
+    it. The layout is that of the specification "Draco 3D Graphics Compression", of version 2.2, to which all
+    encoders of glTF write; other versions are left to the library."""
+    header = bytes(code[:_DRACO_HEADER])
+    if header[:5] != b"DRACO" or tuple(header[5:7]) != (2, 2) or header[7] != _DRACO_MESH:
+        return
+    # An edgebreaker's code begins with the kind of its traversal; then it counts points and faces, and a
+    # sequential one faces and points.
+    place = _DRACO_HEADER + (1 if header[8] == _DRACO_EDGEBREAKER else 0)
+    counts = []
+    for _ in range(2):
+        count, place = _varint(code, place)
+        counts.append(count)
+    # Three coordinates of four bytes for a point, and as many indices for a face.
+    if 12 * sum(counts) > _MOST_TIMES_LARGER * len(code):
+        raise InputError(f"promises {sum(counts):,} points and faces in {len(code)} bytes; it is damaged")
+
+
+def _varint(code: memoryview, place: int) -> tuple[int, int]:
+    """A number of seven bits a byte, the lowest first, and the place behind it."""
+    value = 0
+    for number, byte in enumerate(code[place : place + 10]):
+        value |= (byte & 127) << (7 * number)
+        if byte < 128:
+            return value, place + number + 1
+    raise InputError("ends within its header; the file is damaged")
 
 
 def _library(name: str, what: str, package: str) -> Any:

@@ -17,6 +17,7 @@ from support.gltf_files import QUAD, QUAD_FACES, GltfBuilder, write_document
 
 from incpt.core.errors import InputError, InputWarning
 from incpt.formats import mesh_files
+from incpt.formats.gltf import compression
 from incpt.formats.gltf.accessors import as_floats
 from incpt.formats.gltf.nodes import composed
 from incpt.scene.mesh import Mesh
@@ -254,6 +255,38 @@ def test_draco(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     del mesh
     with pytest.raises(InputError, match="Draco; `pip install DracoPy`, or export it uncompressed"):
         mesh_of(builder.write(tmp_path / "c.glb", [primitive]))
+
+
+def compressed(folder: Path, code: bytes) -> Path:
+    """A file of a triangle that Draco is said to have compressed to that."""
+    builder = GltfBuilder()
+    builder.view(code)
+    builder.accessors = [
+        {"componentType": 5126, "count": 3, "type": "VEC3"},
+        {"componentType": 5125, "count": 3, "type": "SCALAR"},
+    ]
+    extension = {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}}
+    primitive = {"attributes": {"POSITION": 0}, "indices": 1, "extensions": extension}
+    return builder.write(folder / "a.glb", [primitive], extensionsRequired=list(extension))
+
+
+@pytest.mark.parametrize("sequential", [False, True])
+def test_memory_of_draco_is_bounded_before_it_is_taken(tmp_path: Path, sequential: bool) -> None:
+    """Both of its encodings, whose counts of points and faces are read as the library reads them."""
+    draco = pytest.importorskip("DracoPy")
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    code = draco.encode(
+        ball.vertices.astype(np.float32), ball.faces.astype(np.uint32), preserve_order=sequential
+    )
+    place = 11 if code[8] == 0 else 12
+    assert code[8] == (0 if sequential else 1)
+    first, place = compression._varint(memoryview(code), place)
+    second, end = compression._varint(memoryview(code), place)
+    counts = (len(ball.faces), len(ball.vertices))
+    assert (first, second) == (counts if sequential else counts[::-1])
+    many = code[:place] + b"\xff\xff\xff\xff\x0f" + code[end:]
+    with pytest.raises(InputError, match=r"promises 4,294,9\d\d,\d{3} points and faces in \d+ bytes"):
+        mesh_of(compressed(tmp_path, many))
 
 
 def without(monkeypatch: pytest.MonkeyPatch, library: str) -> None:
