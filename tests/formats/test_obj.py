@@ -277,6 +277,14 @@ def test_colours_and_shares(tmp_path: Path) -> None:
     assert (mirror.metallic, mirror.roughness, mirror.base_color) == (1, 0, (0.9, 0.9, 0.8))
 
 
+def test_colours_out_of_range_are_told(tmp_path: Path) -> None:
+    material = material_of(tmp_path, "Kd 1.5 0.5 -0.25\nKe 7 8 9")
+    assert material.base_color == (1, 0.5, 0) and material.emission == (7, 8, 9)
+    path = next(tmp_path.glob("*.obj"))
+    (said,) = told(path, Fate.CHANGED)
+    assert said.startswith("Kd of material 'm' in ") and said.endswith(": 1.5 does not lie from 0 to 1")
+
+
 @pytest.mark.parametrize(
     ("mtl", "expected"),
     [

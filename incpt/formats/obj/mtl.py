@@ -33,6 +33,7 @@ _NUMBERS = ("ns", "ni", "d", "tr", "illum", "pr", "pm", "ps", "pc", "pcr", "anis
 _RANGES = {
     "ns": (0.0, LARGEST_EXPONENT), "ni": (1.0, 100.0), "d": (0.0, 1.0), "tr": (0.0, 1.0), "pr": (0.0, 1.0),
     "pm": (0.0, 1.0), "ps": (0.0, 1.0), "pc": (0.0, 1.0), "pcr": (0.0, 1.0), "aniso": (0.0, 1.0),
+    "kd": (0.0, 1.0), "ks": (0.0, LARGEST), "ke": (0.0, LARGEST), "tf": (0.0, 1.0),
 }  # fmt: skip
 _COLORS = ("kd", "ks", "ke", "tf")
 _SILENT = ("ka", "map_ka", "sharpness")
@@ -152,15 +153,26 @@ def _entries(content: bytes, file: str) -> tuple[dict[str, _Entry], set[str]]:
         try:
             if not _take(entry, keyword, rest):
                 unknown.add(keyword)
-            elif keyword in _RANGES:
-                low, high = _RANGES[keyword]
-                number = entry.numbers[keyword]
-                if not low <= number <= high:
-                    what = f"{words[0]} of material {name!r} in {file}"
-                    import_report.changed(f"{what}: {number:g} does not lie from {low:g} to {high:g}")
+            else:
+                _limit(entry, keyword, f"{words[0]} of material {name!r} in {file}")
         except InputError as error:
             import_report.left_out(f"{words[0]} of material {name!r} in {file}: {error}")
     return entries, unknown
+
+
+def _limit(entry: _Entry, keyword: str, what: str) -> None:
+    """Brings a number or a colour into its range, and tells of it."""
+    if keyword not in _RANGES:
+        return
+    low, high = _RANGES[keyword]
+    values = entry.colors.get(keyword) or (entry.numbers[keyword],)
+    outside = next((value for value in values if not low <= value <= high), None)
+    if outside is None:
+        return
+    import_report.changed(f"{what}: {outside:g} does not lie from {low:g} to {high:g}")
+    if keyword in entry.colors:
+        red, green, blue = (min(max(value, low), high) for value in values)
+        entry.colors[keyword] = red, green, blue
 
 
 def _take(entry: _Entry, keyword: str, rest: str) -> bool:
@@ -192,7 +204,7 @@ def _color(rest: str) -> tuple[float, float, float]:
     if not numbers:
         raise InputError("a colour has no numbers")
     red, green, blue = (*numbers, *numbers[:1] * 2)[:3] if len(numbers) < 3 else numbers
-    return max(red, 0.0), max(green, 0.0), max(blue, 0.0)
+    return red, green, blue
 
 
 def _image(rest: str) -> tuple[str, dict[str, Any]]:
@@ -234,7 +246,7 @@ def _plain(entry: _Entry, textures: Mapping[str, Texture]) -> dict[str, Any]:
     brightest = max(specular)
     exponent = min(max(numbers.get("ns", 0.0), 0.0), LARGEST_EXPONENT)
     values: dict[str, Any] = {
-        "base_color": tuple(min(c, 1.0) for c in colors.get("kd", (0.8, 0.8, 0.8))),
+        "base_color": colors.get("kd", (0.8, 0.8, 0.8)),
         "emission": colors.get("ke", (1.0, 1.0, 1.0) if "Ke" in textures else (0.0, 0.0, 0.0)),
         "roughness": _share(numbers.get("pr", 1 - (exponent / LARGEST_EXPONENT) ** 0.5)),
         "metallic": _share(numbers.get("pm", 0.0)),
@@ -269,7 +281,7 @@ def _bodies(entry: _Entry) -> dict[str, Any]:
     opacity = _share(numbers.get("d", 1 - numbers.get("tr", 0.0)))
     model = int(numbers.get("illum", 2))
     if model in (4, 6, 7, 9):
-        tint = tuple(min(c, 1.0) for c in entry.colors.get("tf", (1.0, 1.0, 1.0)))
+        tint = entry.colors.get("tf", (1.0, 1.0, 1.0))
         tint = tint if any(tint) else (1.0, 1.0, 1.0)
         return {
             "transmission": 1 - opacity if opacity < 1 else 1.0,
