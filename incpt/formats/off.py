@@ -18,6 +18,7 @@ from incpt.core.errors import InputError
 from incpt.core.files import read_bytes
 from incpt.formats import import_report
 from incpt.formats.clean import tell_of_faces, usable_mesh
+from incpt.formats.far_origin import nearer
 from incpt.formats.import_report import counted
 from incpt.formats.polygons import triangles_of
 from incpt.formats.text_numbers import numbers_or_nan, whole_or_negative, words_in_lines
@@ -48,6 +49,7 @@ def read_off(path: Path) -> MeshFile:
     with np.errstate(all="ignore"):
         values = lines.vertices(vertices)
         positions, normals, attributes = _at_vertices(values, has)
+        positions = nearer(positions)
         sizes, corners, colors = lines.faces(vertices, faces)
         triangles = triangles_of(sizes, positions, corners)
     color_at = None

@@ -12,18 +12,26 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core import affine
+from incpt.formats.far_origin import far_offset, moved
 from incpt.scene.mesh import Mesh, MeshSource
-from incpt.scene.mesh_part import MeshPart
+from incpt.scene.mesh_part import MeshFile, MeshPart
 from incpt.scene.transform import IDENTITY
 
 MOST_PARTS = 1_000_000
 """Meshes at places that a file may show: a small file can name a great many, each of many parts."""
 
 
-def with_sources(path: Path, parts: Sequence[MeshPart]) -> tuple[MeshPart, ...]:
-    """The parts of a file with meshes that know their place in it; before, their sources have the names of
-    geometries. A mesh that only one part shows, where it is stored, is that part of the file; others are
-    geometries of it."""
+def settled(path: Path, file: MeshFile) -> MeshFile:
+    """What a file gives, near to the origin and with meshes that know their place in the file; before, their
+    sources have the names of geometries."""
+    offset = far_offset(bounds_of(file.parts))
+    file = file if offset is None else moved(file, offset)
+    return replace(file, parts=_with_sources(path, file.parts))
+
+
+def _with_sources(path: Path, parts: Sequence[MeshPart]) -> tuple[MeshPart, ...]:
+    """A mesh that only one part shows, where it is stored, is that part of the file; others are geometries of
+    it."""
     file = os.path.abspath(path)
     uses = Counter(id(part.mesh) for part in parts)
     made: dict[int, Mesh] = {}

@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,7 @@ from incpt.core.errors import InputError
 from incpt.core.files import read_bytes
 from incpt.formats import import_report
 from incpt.formats.clean import tell_of_faces, usable_mesh
+from incpt.formats.far_origin import far_offset
 from incpt.formats.import_report import counted
 from incpt.formats.names import Names
 from incpt.formats.polygons import triangles_of
@@ -32,6 +33,7 @@ from incpt.scene.mesh import MeshSource
 from incpt.scene.mesh_part import MeshFile, MeshPart
 
 Floats = npt.NDArray[np.float32]
+Corners = npt.NDArray[np.floating[Any]]
 
 _HEADER, _FACET = 80, 50
 """Bytes before the number of facets in a file of bytes, and of each facet."""
@@ -51,8 +53,8 @@ class _Solid:
     more had fewer than three corners."""
 
     name: str
-    facets: Floats
-    normals: Floats | None = None
+    facets: Corners
+    normals: Corners | None = None
     colors: npt.NDArray[np.float64] | None = None
     too_small: int = 0
 
@@ -63,8 +65,9 @@ def read_stl(path: Path) -> MeshFile:
     solids = list(_solids_of_text(content)) if _is_text(content) else [_solid_of_bytes(content)]
     counts = dict.fromkeys(("in all", "with fewer than three corners"), sum(one.too_small for one in solids))
     parts, names = [], Names()
+    offset = far_offset(np.concatenate([one.facets.reshape(-1, 3) for one in solids] or [np.zeros((0, 3))]))
     for solid in solids:
-        vertices, places = welded(solid.facets.reshape(-1, 3))
+        vertices, places = welded(_near(solid.facets, offset).reshape(-1, 3))
         faces = places.reshape(-1, 3)
         colors = NO_ATTRIBUTES if solid.colors is None else VertexAttributes(colors=solid.colors)
         color_at = np.repeat(np.arange(len(faces))[:, None], 3, axis=1)
@@ -80,6 +83,12 @@ def read_stl(path: Path) -> MeshFile:
     return MeshFile(
         tuple(replace(one, mesh=replace(one.mesh, source=replace(source, part=one.name))) for one in parts)
     )
+
+
+def _near(facets: Corners, offset: npt.NDArray[np.float64] | None) -> Floats:
+    """Facets in single precision, less what is taken off of their coordinates."""
+    with np.errstate(over="ignore"):
+        return (facets if offset is None else facets - offset).astype(np.float32)
 
 
 def _is_text(content: bytes) -> bool:
@@ -168,8 +177,7 @@ def _solid_of_text(text: bytes, name: str) -> _Solid:
         plain = plain.replace(word, b"")
     numbers = numbers_at_once(plain, np.float64)
     if len(numbers) == 12 * facets == 4 * text.count(b"vertex"):
-        with np.errstate(over="ignore"):
-            rows = numbers.reshape(-1, 4, 3).astype(np.float32)
+        rows = numbers.reshape(-1, 4, 3)
         return _Solid(name, rows[:, 1:], rows[:, 0])
     return _odd_solid(text, name)
 
@@ -183,8 +191,7 @@ def _odd_solid(text: bytes, name: str) -> _Solid:
     vertices = np.array(corners, np.float64).reshape(-1, 3)
     sizes = np.array([len(loop) for loop in loops], np.int64)
     found = triangles_of(sizes, vertices, np.arange(len(vertices)))
-    with np.errstate(over="ignore"):
-        return _Solid(name, vertices[found.faces].astype(np.float32), too_small=found.too_small)
+    return _Solid(name, vertices[found.faces], too_small=found.too_small)
 
 
 def _tell_of_normals(solids: list[_Solid]) -> None:

@@ -28,7 +28,7 @@ from incpt.formats.import_options import current_options
 from incpt.formats.import_report import counted
 from incpt.formats.names import Names
 from incpt.formats.placement import placed_arrays, transform_of
-from incpt.formats.shared_meshes import MOST_PARTS, bounds_of, with_sources
+from incpt.formats.shared_meshes import MOST_PARTS, bounds_of, settled
 from incpt.scene.camera import Camera
 from incpt.scene.mesh import Mesh, MeshSource
 from incpt.scene.mesh_part import MeshFile, MeshPart
@@ -61,7 +61,7 @@ def read_gltf(path: Path) -> MeshFile:
     meshes = len({id(part.mesh) for part in parts})
     counts = {"object": len(parts), "mesh": meshes, "light": len(lights), "camera": len(cameras)}
     import_report.read(", ".join(counted(count, what) for what, count in counts.items() if count))
-    return MeshFile(parts, lights, cameras, tuple(document.files))
+    return settled(path, MeshFile(parts, lights, cameras, tuple(document.files)))
 
 
 def _tell_of_variants(document: Document) -> None:
@@ -111,7 +111,7 @@ class _Parts:
         tell_of_faces(self._counts)
         if len(placed) == 1:
             parts = [replace(parts[0], name=None)]
-        return with_sources(self._document.path, parts)
+        return tuple(parts)
 
     def _placed(self, node: Node) -> Iterator[_Placed]:
         """Every primitive that has area of the mesh of a node, at each place where the node shows it."""

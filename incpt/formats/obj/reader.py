@@ -16,6 +16,7 @@ from incpt.core.errors import InputError
 from incpt.core.files import read_bytes
 from incpt.formats import import_report
 from incpt.formats.clean import tell_of_faces, usable_mesh
+from incpt.formats.far_origin import nearer
 from incpt.formats.import_options import current_options
 from incpt.formats.import_report import counted
 from incpt.formats.names import Names
@@ -38,6 +39,7 @@ def read_obj(path: Path) -> MeshFile:
     """The parts of an OBJ file with the materials of its MTL files; see `mesh_files.load_file`. Raises
     InputError."""
     text = read_text(decoded(read_bytes(path)))
+    text = replace(text, vertices=nearer(text.vertices))
     triangles = _Triangles(text)
     normals = _smoothed(text, triangles)
     counts = {"in all": triangles.too_small, "with fewer than three corners": triangles.too_small}

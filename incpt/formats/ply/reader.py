@@ -14,6 +14,7 @@ from incpt.core.errors import InputError
 from incpt.core.files import read_bytes
 from incpt.formats import bitmaps, import_report
 from incpt.formats.clean import tell_of_faces, usable_mesh
+from incpt.formats.far_origin import nearer
 from incpt.formats.import_report import counted
 from incpt.formats.outside import check_inside
 from incpt.formats.ply.header import Header, read_header
@@ -94,7 +95,7 @@ class _Vertices:
         if rows is None or not all(name in rows for name in _POSITION):
             raise InputError("has no vertices with x, y and z; it is no mesh")
         self.count, self.used = rows.count, [*_POSITION]
-        self.positions = np.stack([rows.numbers(name) for name in _POSITION], axis=1)
+        self.positions = nearer(np.stack([rows.numbers(name) for name in _POSITION], axis=1))
         self.normals = None
         if all(name in rows for name in _NORMAL):
             self.normals = np.stack([rows.numbers(name) for name in _NORMAL], axis=1)

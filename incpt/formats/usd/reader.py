@@ -19,11 +19,12 @@ from incpt.formats.import_options import current_options
 from incpt.formats.import_report import counted
 from incpt.formats.names import Names
 from incpt.formats.placement import placed_mesh, transform_of
-from incpt.formats.shared_meshes import MOST_PARTS, bounds_of, with_sources
+from incpt.formats.shared_meshes import MOST_PARTS, bounds_of, settled
 from incpt.formats.usd import meshes, solids
 from incpt.formats.usd.cameras import camera_of
 from incpt.formats.usd.lights import Lights, is_light
 from incpt.formats.usd.materials import Materials, Surface
+from incpt.formats.usd.memory import bounded_memory
 from incpt.formats.usd.meshes import Polygons
 from incpt.formats.usd.skinning import bent_points
 from incpt.formats.usd.stage import OpenStage, open_stage, plain_errors
@@ -42,7 +43,7 @@ _Y_FROM_Z = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]]
 
 def read_usd(path: Path) -> MeshFile:
     """What a .usd, .usda, .usdc or .usdz file shows, in metres and with y up. Raises InputError."""
-    with plain_errors():
+    with bounded_memory(path.stat().st_size), plain_errors():
         return _read(path)
 
 
@@ -70,7 +71,8 @@ def _read(path: Path) -> MeshFile:
     import_report.read(", ".join(counted(count, what) for what, count in counts.items() if count))
     # What is lit by a mesh alone has no studio around it.
     environment = lights.environment or (Environment() if lights.parts else None)
-    return MeshFile(made, tuple(lights.lights), cameras, tuple(opened.files), environment)
+    file = MeshFile(made, tuple(lights.lights), cameras, tuple(opened.files), environment)
+    return settled(path, file)
 
 
 def _metres(opened: OpenStage) -> float:
@@ -105,7 +107,7 @@ class _Parts:
     """Makes parts of places: what is stored once is one mesh, however many places show it."""
 
     def __init__(self, opened: OpenStage, materials: Materials, ours: Matrix) -> None:
-        self._path, self._moment, self._materials, self._ours = opened.path, opened.moment, materials, ours
+        self._moment, self._materials, self._ours = opened.moment, materials, ours
         self._meshes: dict[object, Mesh | None] = {}
         self._solids: dict[Mesh, Mesh] = {}
         self._polygons: tuple[str, Polygons | None] = ("", None)
@@ -142,7 +144,7 @@ class _Parts:
         for part in more:
             self._add(replace(part, name=self._names.new(part.name or "light")))
         tell_of_faces(self._counts)
-        return with_sources(self._path, self._found)
+        return tuple(self._found)
 
     def _add(self, part: MeshPart, is_counted: bool = False) -> None:
         if not is_counted:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.usd_files import METRES, QUAD_MESH, load_usda, write_usda
 
@@ -14,6 +16,9 @@ from incpt.formats.import_report import Fate
 from incpt.formats.registry import load_with_report
 
 pxr = pytest.importorskip("pxr")
+
+from incpt.formats.usd import probe  # noqa: E402 (needs the library)
+from incpt.formats.usd.memory import bounded_memory  # noqa: E402
 
 
 def chair(folder: Path, name: str = "chair.usda") -> Path:
@@ -147,3 +152,44 @@ def test_without_the_library_it_is_named(tmp_path: Path, monkeypatch: pytest.Mon
         InputError, match=r'cannot be read without a library; run: pip install "incpt\[usd\]"'
     ):
         load_with_report(path)
+
+
+def crate(folder: Path) -> Path:
+    from pxr import Sdf
+
+    text = write_usda(folder / "a.usda", QUAD_MESH)
+    assert Sdf.Layer.FindOrOpen(str(text)).Export(str(folder / "a.usdc"))
+    return folder / "a.usdc"
+
+
+def test_counts_that_lie_take_no_memory(tmp_path: Path) -> None:
+    """Of the tokens of a crate file, as its table of contents places them: 100 GB of them."""
+    path = crate(tmp_path)
+    content = bytearray(path.read_bytes())
+    table = int.from_bytes(content[16:24], "little")
+    count = int.from_bytes(content[table : table + 8], "little")
+    sections = [content[table + 8 + 32 * i : table + 40 + 32 * i] for i in range(count)]
+    (tokens,) = (one for one in sections if one.startswith(b"TOKENS\0"))
+    place = int.from_bytes(tokens[16:24], "little")
+    content[place + 8 : place + 16] = (100 << 30).to_bytes(8, "little")
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="damaged"):
+        load_with_report(path)
+
+
+def test_what_would_end_the_process_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(probe, "_PROGRAM", "import os; os.abort()")
+    with pytest.raises(InputError, match=r"a\.usdc: asks for more than can be in files of its size"):
+        load_with_report(crate(tmp_path))
+    load_with_report(tmp_path / "a.usda")
+    monkeypatch.setattr(probe, "_PROGRAM", "import time; time.sleep(60)")
+    monkeypatch.setattr(probe, "_SECONDS", 0.1)
+    with pytest.raises(InputError, match=r"takes more than 0\.1 seconds to open"):
+        load_with_report(tmp_path / "a.usdc")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems bound no memory")
+def test_memory_is_bounded_while_values_are_read() -> None:
+    with bounded_memory(0), pytest.raises(MemoryError):
+        np.empty(4 << 30, np.uint8)
+    assert len(np.empty(4 << 30, np.uint8)) == 4 << 30
