@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from incpt.cli.console import complain
-from incpt.cli.options import DeviceOption, UnitOption, UpOption, import_options
+from incpt.cli.options import DeviceOption, ParameterOption, UnitOption, UpOption, import_options
 
 _EXTRAS = {"ui": "ui", "benchmarks": "bench"}
 PASS_ON = {"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
@@ -22,10 +22,11 @@ def edit(
     ] = None,
     up: UpOption = None,
     unit: UnitOption = None,
+    define: ParameterOption = None,
     device: DeviceOption = None,
 ) -> None:
     """The editor: select and drag things, and see the change at once."""
-    options = import_options(up, unit)
+    options = import_options(up, unit, define)
     raise typer.Exit(enter("incpt.ui.app", "the editor", file, device, options))
 
 

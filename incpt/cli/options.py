@@ -31,6 +31,16 @@ BouncesOption = Annotated[
 TimeOption = Annotated[
     float | None, typer.Option("--time", help="Seconds into the animations of glTF and USD files.", min=0)
 ]
+ClipOption = Annotated[
+    str | None,
+    typer.Option("--clip", help="Of several animations of a glTF file the one that runs, by name."),
+]
+ParameterOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "-D", "--define", help="A parameter of a Mitsuba scene: NAME=VALUE; may come several times."
+    ),
+]
 StrictOption = Annotated[
     bool, typer.Option("--strict", help="Refuse files of which anything has to be left out.")
 ]
@@ -52,16 +62,27 @@ MissingOption = Annotated[
 ]
 
 
-def import_options(up: str | None, unit: str | None, **others: Any) -> dict[str, Any]:
+def import_options(
+    up: str | None, unit: str | None, define: list[str] | None = None, **others: Any
+) -> dict[str, Any]:
     """The keywords of `registry.load_with_report` that options ask for. Raises InputError."""
     from incpt.formats.orientation import unit_of
 
+    if define:
+        others["parameters"] = dict(map(_parameter, define))
     if unit is None:
         return {"up": up, "unit": None, **others}
     try:
         return {"up": up, "unit": unit_of(unit), **others}
     except InputError as error:
         raise InputError(f"--{error}") from None
+
+
+def _parameter(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not name or not equals:
+        raise InputError(f"-D: {text!r} is no NAME=VALUE; write it like spp=64")
+    return name, value
 
 
 def read_for_writing(file: Path, up: str | None, unit: str | None, strict: bool, **others: Any) -> Scene:

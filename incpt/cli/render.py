@@ -13,9 +13,11 @@ import typer
 from incpt.cli.console import Stopped, complain, interruption, path_progress
 from incpt.cli.options import (
     BouncesOption,
+    ClipOption,
     DeviceOption,
     MissingOption,
     OutsideOption,
+    ParameterOption,
     SceneArgument,
     SeedOption,
     SizeOption,
@@ -82,6 +84,7 @@ def render(
         ),
     ] = False,
     time: TimeOption = None,
+    clip: ClipOption = None,
     frames: Annotated[
         str | None,
         typer.Option(
@@ -94,6 +97,7 @@ def render(
     allow_missing: MissingOption = False,
     up: UpOption = None,
     unit: UnitOption = None,
+    define: ParameterOption = None,
     device: DeviceOption = None,
 ) -> None:
     """Render a scene to a picture. Ctrl-C keeps what is done."""
@@ -105,7 +109,9 @@ def render(
         raise InputError(f"--aovs: {output} cannot hold them; use an .exr")
     if denoise:
         denoising.require_denoiser()
-    asked = import_options(up, unit, allow_outside=allow_outside, allow_missing=allow_missing)
+    asked = import_options(
+        up, unit, define, clip=clip, allow_outside=allow_outside, allow_missing=allow_missing
+    )
     shots = [(output, time)] if frames is None else _shots(output, frames, fps, time)
     session: Session | None = None
     for path, moment in shots:

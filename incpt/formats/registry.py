@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
-from incpt.core.checks import path_of
+from incpt.core.checks import path_of, require
 from incpt.core.errors import InputError, InputWarning, in_place
 from incpt.core.files import check_readable
 from incpt.formats import import_report
@@ -123,17 +125,28 @@ def load(
     up: str | None = None,
     unit: float | None = None,
     allow_missing: bool = False,
+    clip: str | None = None,
+    parameters: Mapping[str, str] | None = None,
 ) -> Scene:
     """A scene from a scene file (.toml, .xml of Mitsuba, .pbrt), or a default scene around a mesh file.
 
     `time`: seconds into the animations of its files; None leaves them out. `allow_outside`: files may
     name others outside their own folders. `up` ("y" or "z") and `unit` (metres) say how a mesh file is meant
     whose format does not say it (OBJ, PLY, STL ...). `allow_missing`: cubes and single colours stand for
-    meshes and images of a scene file that cannot be read. InputWarnings tell of all that was left out, and
-    of a scene that shows nothing. Raises InputError, one line that names file, table and key.
+    meshes and images of a scene file that cannot be read. `clip`: of several animations of a glTF file the
+    name of the one that runs; None: all do at once. `parameters`: values of parameters of a Mitsuba scene
+    (`<default>`), by their names. InputWarnings tell of all that was left out, and of a scene that shows
+    nothing. Raises InputError, one line that names file, table and key.
     """
     scene, report = load_with_report(
-        path, time=time, allow_outside=allow_outside, up=up, unit=unit, allow_missing=allow_missing
+        path,
+        time=time,
+        allow_outside=allow_outside,
+        up=up,
+        unit=unit,
+        allow_missing=allow_missing,
+        clip=clip,
+        parameters=parameters,
     )
     for complaint in complaints(path, scene, report):
         warnings.warn(complaint, InputWarning, stacklevel=2)
@@ -155,10 +168,14 @@ def load_with_report(
     up: str | None = None,
     unit: float | None = None,
     allow_missing: bool = False,
+    clip: str | None = None,
+    parameters: Mapping[str, str] | None = None,
 ) -> tuple[Scene, ImportReport]:
     """A scene as `load` gives it, and what became of its files: nothing is warned of. Raises InputError."""
     path = path_of("path", path)
-    options = ImportOptions(time, allow_outside, up, unit, allow_missing=allow_missing)
+    require("parameters", parameters, (Mapping, NoneType), 'a mapping, such as {"spp": "64"}')
+    given = tuple(sorted((parameters or {}).items()))
+    options = ImportOptions(time, allow_outside, up, unit, clip, given, allow_missing=allow_missing)
     check_readable(path)
     row = format_of(path, FileKind.SCENE, FileKind.MESH)
     if row is None and (what := lacking(path)):

@@ -26,15 +26,18 @@ _NEARLY_ALIKE = 0.9995
 Array = npt.NDArray[np.float64]
 
 
-def animate(time: float | None, document: Document, accessors: Accessors) -> None:
+def animate(time: float | None, clip: str | None, document: Document, accessors: Accessors) -> None:
     """Puts what the animations of a file say, `time` seconds after they began, into its JSON; nothing where
-    it is None. All run at once; where two move the same property, the first does. Raises InputError."""
+    it is None. The one of the name `clip` runs, or all at once, where that is None; where two move the same
+    property, the first does. Raises InputError."""
     animations = list(document.root.tables("animations"))
     if time is None:
         if animations:
             what = "1 animation" if len(animations) == 1 else f"{len(animations)} animations"
             import_report.left_out(f"{what}: nothing moves without --time (`time` in Python)")
         return
+    if clip is not None and animations:
+        animations = [_chosen(clip, animations)]
     moved: dict[str, float | bool | list[float]] = {}
     for animation in animations:
         label = animation.text("name") or animation.place
@@ -52,6 +55,14 @@ def animate(time: float | None, document: Document, accessors: Accessors) -> Non
         moved |= fresh
     for pointer, value in moved.items():
         document.put(pointer, value)
+
+
+def _chosen(clip: str, animations: list[Table]) -> Table:
+    """The animation of that name, or of that number from 0 on, as files without names have them. Raises
+    InputError."""
+    names = [animation.text("name") or str(number) for number, animation in enumerate(animations)]
+    one_of("clip", clip, names)
+    return animations[names.index(clip)]
 
 
 def _pointer(target: Table, document: Document) -> str | None:

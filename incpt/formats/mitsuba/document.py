@@ -15,6 +15,7 @@ import numpy as np
 
 from incpt.core.errors import InputError, in_place
 from incpt.formats import import_report
+from incpt.formats.import_options import current_options
 from incpt.formats.mitsuba.node import UNNAMED, Node
 from incpt.formats.mitsuba.transforms import step_matrix
 from incpt.formats.mitsuba.values import VALUE_TAGS, value_of
@@ -45,7 +46,9 @@ class Document:
         self.path = path
         self.nodes: list[Node] = []
         self._folders = [path.parent]
-        self._parameters: dict[str, str] = {}
+        # Those that are given come before every <default>.
+        self._parameters = dict(current_options().parameters)
+        self._unused = set(self._parameters)
         self._by_id: dict[str, Node] = {}
         self._references: list[tuple[Node, str, str]] = []
         self._open_files: list[Path] = []
@@ -55,6 +58,8 @@ class Document:
             if node.tag != "scene":
                 raise InputError(f"{node.place}: <{node.tag}> is no scene; the outermost element is <scene>")
             self.root = node
+        for name in sorted(self._unused):
+            import_report.left_out(f"the parameter {name[:40]!r}: nothing in the scene asks for it")
         self._resolve()
         self._check_depth()
 
@@ -102,6 +107,7 @@ class Document:
         """The value of the parameter with the longest name that a word begins with, and the rest of it."""
         for end in range(min(len(word), _LONGEST_NAME), 0, -1):
             if word[:end] in self._parameters:
+                self._unused.discard(word[:end])
                 return self._parameters[word[:end]] + word[end:]
         raise InputError(f"the parameter ${word[:40]} has no value; give it one by <default>")
 

@@ -427,6 +427,25 @@ def test_animated_rotations_scales_and_weights(tmp_path: Path) -> None:
     assert quad.mesh.vertices[0, 2] == pytest.approx(4)
 
 
+def test_one_of_several_animations_runs(tmp_path: Path) -> None:
+    moves = [(0, "translation", "LINEAR", [0, 2], [[1] * 3, [4] * 3])]
+    path = animated(tmp_path / "a.gltf", moves)
+    document = json.loads(path.read_text())
+    (first,) = document["animations"]
+    still = {**first, "name": "still", "channels": [{**first["channels"][0], "sampler": 0}]}
+    still["channels"][0]["target"] = {"node": 0, "path": "scale"}
+    path.write_text(json.dumps({**document, "animations": [first, {**still, "name": ""}]}))
+    both, _ = read(path, time=1.0)
+    moved, report = read(path, time=1.0, clip="move")
+    scaled, _ = read(path, time=2.0, clip="1")
+    assert [one.objects[0].position[0] for one in (both, moved, scaled)] == [2.5, 2.5, 0]
+    assert moved.objects[0].scale == (1, 1, 1) and scaled.objects[0].scale[0] == 4 and report.is_whole
+    with pytest.raises(InputError, match=r"clip: 'run' is not known; choose one of move, 1"):
+        read(path, time=1.0, clip="run")
+    with pytest.raises(InputError, match="clip: says what moves, and no time is given"):
+        read(path, clip="move")
+
+
 def test_animated_pointers(tmp_path: Path) -> None:
     """To what there is, to what has a default only, and into a list; one leads to what cannot be moved."""
     wanted = [

@@ -26,6 +26,20 @@ def test_parameters_take_the_longest_name(tmp_path: Path) -> None:
     assert scene.materials["rectangle"].base_color == (0.2, 0.21, 0)
 
 
+def test_given_parameters_take_the_place_of_defaults(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        '<default name="red" value="0.5"/><shape type="rectangle"><bsdf type="diffuse">'
+        '<rgb name="reflectance" value="$red $green 0"/></bsdf></shape>',
+    )
+    given = {"red": "0.25", "green": "0.75", "blue": "1"}
+    scene, report = registry.load_with_report(path, parameters=given)
+    assert scene.materials["rectangle"].base_color == (0.25, 0.75, 0)
+    assert told(report) == ["the parameter 'blue': nothing in the scene asks for it"]
+    with pytest.raises(InputError, match="parameters: 3 is not a text"):
+        registry.load(path, parameters={"red": 3})  # type: ignore[dict-item]
+
+
 def test_references_by_ids_and_aliases(tmp_path: Path) -> None:
     scene, _ = read(
         tmp_path,
