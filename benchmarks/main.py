@@ -8,7 +8,18 @@ import typer
 
 from incpt.benchmarks import report
 from incpt.benchmarks.impact import command
-from incpt.benchmarks.measures import build, latency, rays, scale, screenshots, soak, steps, sweep, table51
+from incpt.benchmarks.measures import (
+    build,
+    fuzz,
+    latency,
+    rays,
+    scale,
+    screenshots,
+    soak,
+    steps,
+    sweep,
+    table51,
+)
 from incpt.benchmarks.peers import agreement, compare
 from incpt.core.errors import InputError
 
@@ -32,6 +43,7 @@ app.command("scale")(scale.scale)
 app.command("steps")(steps.steps)
 app.command("latency")(latency.latency)
 app.command("soak")(soak.soak)
+app.command("fuzz")(fuzz.fuzz)
 app.command("screenshots")(screenshots.screenshots)
 app.command("report")(report.report)
 

@@ -88,6 +88,13 @@ def pixels_of(content: bytes, suffix: str) -> npt.NDArray[Any]:
 def read_pixels(path: Path) -> npt.NDArray[Any]:
     """(H, W, C) the pixels of a file as `load_bitmap` gives them. Raises InputError that does not name the
     file."""
+    try:
+        return _read_pixels(path)
+    except UnicodeDecodeError:  # Also messages of the library quote what a damaged file has.
+        raise InputError("is damaged (it holds bytes that are no text); save it again") from None
+
+
+def _read_pixels(path: Path) -> npt.NDArray[Any]:
     import OpenImageIO as oiio  # noqa: N813 (its own documents call it so)
 
     config = oiio.ImageSpec()

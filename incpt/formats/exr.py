@@ -5,7 +5,7 @@ What has no single colour for each pixel is refused. OpenEXR is imported by the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -105,7 +105,7 @@ def _from_chroma(
 ) -> Float32Image:
     """(H, W, 3) of luminance Y, and of (R - Y) / Y and (B - Y) / Y for every second pixel, interpolated
     between these ("Technical Introduction to OpenEXR", luminance/chroma images)."""
-    weights = xyz_from_rgb(header.get("chromaticities", REC_709))[1]
+    weights = xyz_from_rgb(_chromaticities(header))[1]
     y = luminance.astype(np.float64)
     r, b = ((_enlarged(chroma.astype(np.float64), y.shape) + 1) * y for chroma in (red, blue))
     g = (y - weights[0] * r - weights[2] * b) / weights[1]
@@ -126,7 +126,7 @@ def _enlarged(plane: npt.NDArray[np.float64], shape: tuple[int, ...]) -> npt.NDA
 
 def _in_rec709(colors: Float32Image, header: Mapping[str, Any]) -> Float32Image:
     """The same colours by the primaries of Rec. 709, as near as these can show them."""
-    chromaticities = header.get("chromaticities", REC_709)
+    chromaticities = _chromaticities(header)
     if np.allclose(chromaticities, REC_709, atol=_SAME):
         return colors
     matrix = rec709_from_rgb(chromaticities)
@@ -138,6 +138,15 @@ def _in_rec709(colors: Float32Image, header: Mapping[str, Any]) -> Float32Image:
     beyond = f"; {100 * outside:.2g} % of the pixels are beyond them, and clipped" if outside else ""
     import_report.changed(f"colours: converted to the primaries and the white of Rec. 709{beyond}")
     return np.where(colors == 0, colors, np.maximum(converted, 0)).astype(np.float32)
+
+
+def _chromaticities(header: Mapping[str, Any]) -> Sequence[float]:
+    """Those of a header, or of Rec. 709. Raises InputError."""
+    found: Any = header.get("chromaticities", REC_709)
+    try:
+        return [float(number) for number in found]
+    except TypeError:  # The library knows the attribute by its name, and not by its damaged type.
+        raise InputError("chromaticities: are no numbers; the file is damaged") from None
 
 
 def _windowed(colors: Float32Image, header: Mapping[str, Any]) -> Float32Image:

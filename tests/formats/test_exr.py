@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from incpt.core.errors import InputError
-from incpt.formats import images, import_report, insert
+from incpt.formats import bitmaps, images, import_report, insert
 from incpt.formats.import_report import Fate
 from incpt.picture.color import REC_709, linear_from_srgb, rec709_from_rgb, xyz_from_rgb
 from incpt.scene.model import Scene
@@ -97,6 +97,18 @@ def test_chromaticities_of_no_light_are_told(tmp_path: Path) -> None:
     path = written(tmp_path / "a.exr", {"RGB": flat(0.5, 0.2, 0.1)}, chromaticities=(0.3,) * 8)
     assert told(path, Fate.LEFT_OUT)[0].startswith("chromaticities: no light has them")
     np.testing.assert_array_equal(images.load_image(path).pixels, flat(0.5, 0.2, 0.1))
+
+
+def test_damaged_attributes_are_one_line(tmp_path: Path) -> None:
+    """One of an unknown type, and one whose type is no text."""
+    path = written(tmp_path / "a.exr", {"RGB": flat(0.5, 0.2, 0.1)}, chromaticities=REC_2020)
+    content = path.read_bytes()
+    path.write_bytes(content.replace(b"chromaticities\0c", b"chromaticities\0x", 1))
+    with pytest.raises(InputError, match=r"a\.exr: chromaticities: are no numbers; the file is damaged"):
+        images.load_image(path)
+    path.write_bytes(content.replace(b"channels\0c", b"channels\0\xff", 1))
+    with pytest.raises(InputError, match=r"a\.exr: is damaged \(it holds bytes that are no text\)"):
+        bitmaps.load_bitmap(path)
 
 
 def test_luminance_and_chroma(tmp_path: Path) -> None:

@@ -128,6 +128,9 @@ def plain_errors() -> Iterator[None]:
         yield
     except MemoryError:
         raise InputError("needs more memory than files of its size do; it is damaged") from None
+    except (TypeError, AttributeError):
+        # Where a file says another type than the schema does, its values come as objects that are nothing.
+        raise InputError("has values of other types than its schemas; it is damaged") from None
     except (RuntimeError, UnicodeDecodeError) as error:
         raise InputError(f"is no USD file, or a damaged one ({_first_of(error)})") from None
     finally:
