@@ -55,8 +55,7 @@ class Polygons:
         self._path = str(prim.GetPath())
         self._subsets = [self._faces_of(subset) for subset in subsets_of(prim)]
         self._is_bent = bent is not None
-        points = self._mesh.GetPointsAttr().Get(moment) if bent is None else bent
-        self.points = np.asarray(np.zeros((0, 3)) if points is None else points, np.float32)
+        self.points = _vectors("points", self._mesh.GetPointsAttr().Get(moment) if bent is None else bent)
         sizes = _indices(self._mesh.GetFaceVertexCountsAttr(), moment)
         corners = _indices(self._mesh.GetFaceVertexIndicesAttr(), moment)
         if (sizes < 0).any() or sizes.sum() != len(corners):
@@ -116,7 +115,7 @@ class Polygons:
                 return of_primvar(primvar, 3, self._moment, triangles)
             attribute = self._mesh.GetNormalsAttr()
             if attribute.HasAuthoredValue():
-                values = np.asarray(attribute.Get(self._moment), np.float32).reshape(-1, 3)
+                values = _vectors("normals", attribute.Get(self._moment))
                 interpolation = str(self._mesh.GetNormalsInterpolation())
                 return at_corners(values, None, interpolation, triangles)
         except InputError as error:
@@ -163,9 +162,29 @@ class Polygons:
             return None
 
 
+def _vectors(name: str, found: Any) -> Array:
+    """(N, 3) what an attribute has, whose type may be another one than that of its schema. Raises
+    InputError."""
+    values = _numbers(name, np.zeros((0, 3)) if found is None else found, np.float32)
+    if values.ndim != 2 or values.shape[1] != 3:
+        raise InputError(f"{name}: have not three numbers each; the file is damaged")
+    return values
+
+
 def _indices(attribute: Any, moment: Any) -> Indices:
+    """(N,) Raises InputError."""
     found = attribute.Get(moment)
-    return np.asarray([] if found is None else found).astype(np.int64)
+    values = _numbers(str(attribute.GetName()), [] if found is None else found, np.int64)
+    if values.ndim != 1:
+        raise InputError(f"{attribute.GetName()}: is no list of numbers; the file is damaged")
+    return values
+
+
+def _numbers(name: str, found: Any, kind: type[np.generic]) -> npt.NDArray[Any]:
+    try:
+        return np.asarray(found).astype(kind)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: hold no numbers; the file is damaged") from None
 
 
 def _chosen(triangles: Triangles, which: npt.NDArray[np.bool_]) -> Triangles:

@@ -79,7 +79,8 @@ def _metres(opened: OpenStage) -> float:
     """Of the stage's unit."""
     if not UsdGeom.StageHasAuthoredMetersPerUnit(opened.stage):
         import_report.changed("the unit: the file says none, and centimetres are that of USD")
-    metres = float(UsdGeom.GetStageMetersPerUnit(opened.stage))
+    # Asked for as metadata, because the schema's own way refuses the single precision that some files have.
+    metres = float(opened.stage.GetMetadata(UsdGeom.Tokens.metersPerUnit))
     if not 1e-9 <= metres <= 1e9:
         raise InputError(f"metersPerUnit: {metres:g} is no unit; write 0.01 for centimetres")
     return metres
@@ -144,6 +145,8 @@ class _Parts:
         for part in more:
             self._add(replace(part, name=self._names.new(part.name or "light")))
         tell_of_faces(self._counts)
+        if not self._found:
+            raise InputError("has no mesh that can stand where the file places it")
         return tuple(self._found)
 
     def _add(self, part: MeshPart, is_counted: bool = False) -> None:

@@ -21,7 +21,8 @@ from incpt.scene.checks import LARGEST
 MOST_LAYERS = 10_000
 _SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 _IN_LAYER = re.compile(r"\S*/(\S+):(\d+):\d+:")
-"""How messages of the library name a place in a text."""
+"""How messages of the library name a place in a text, and a file."""
+_ASSET = re.compile(r"@[^@]*/([^@/]+)@")
 _GRAMMAR = re.compile(r"parse error matching .*", re.DOTALL)
 """How they quote the names of their own grammar."""
 _CONTEXT = " (instantiating stage"
@@ -146,5 +147,5 @@ def _first_of(error: Exception) -> str:
     except UnicodeDecodeError:
         lines = []
     text = lines[0].split(" : '", 1)[-1] if lines else "it holds bytes that are no text"
-    text = _IN_LAYER.sub(r"\1, line \2:", text)
+    text = _IN_LAYER.sub(r"\1, line \2:", _ASSET.sub(r"@\1@", text))
     return one_line(_GRAMMAR.sub("not understood", text))[:160].strip(" '.")

@@ -67,7 +67,7 @@ class Walk:
             if count >= _MOST_PRIMS:
                 raise InputError(f"shows more than {_MOST_PRIMS:,} prims; use fewer instances")
             yield place
-        for purpose, number in self._hidden.items():
+        for purpose, number in (+self._hidden).items():
             import_report.left_out(f"{counted(number, 'prim')} of purpose {purpose!r}: not for pictures")
 
     def _below(self, first: _Step) -> Iterator[Place]:

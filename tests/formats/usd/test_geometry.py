@@ -346,11 +346,35 @@ def test_damaged_meshes_are_said(tmp_path: Path) -> None:
         load_usda(tmp_path, 'def Xform "x" {\n}')
 
 
+@pytest.mark.parametrize(
+    ("text", "other", "said"),
+    [
+        ("point3f[] points = [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]", "int[] points = [1]",
+         "'bad': points: have not three numbers each"),
+        ("int[] faceVertexCounts = [4]", 'string[] faceVertexCounts = ["a"]',
+         "'bad': faceVertexCounts: hold no numbers"),
+        ("int[] faceVertexCounts = [4]", "int2[] faceVertexCounts = [(4, 4)]",
+         "'bad': faceVertexCounts: is no list of numbers"),
+    ],
+)  # fmt: skip
+def test_attributes_of_other_types_are_said(tmp_path: Path, text: str, other: str, said: str) -> None:
+    bad = QUAD.replace(text, other)
+    assert bad != QUAD
+    scene, report = load_usda(tmp_path, f'{QUAD_MESH}\ndef Mesh "bad" {{ {bad} }}')
+    assert len(scene.objects) == 1 and report.of(Fate.LEFT_OUT)[0].text.startswith(said)
+
+
+def test_points_of_another_precision(tmp_path: Path) -> None:
+    assert area(mesh_of(tmp_path, "", QUAD.replace("point3f", "double3"))) == pytest.approx(4)
+
+
 def test_placements_that_flatten_are_said(tmp_path: Path) -> None:
     body = f'{QUAD_MESH}\ndef Mesh "flat" {{ {QUAD} {placed("float3 scale = (1, 0, 1)")} }}'
     scene, report = load_usda(tmp_path, body)
     assert len(scene.objects) == 1
     assert [one.text for one in report.of(Fate.LEFT_OUT)] == ["'flat': its placement flattens it"]
+    with pytest.raises(InputError, match="has no mesh that can stand where the file places it"):
+        load_usda(tmp_path, body.replace(QUAD_MESH, ""))
 
 
 def test_parts_are_found_by_their_names(tmp_path: Path) -> None:
