@@ -48,7 +48,7 @@ def read_usd(path: Path) -> MeshFile:
 
 
 def _read(path: Path) -> MeshFile:
-    opened = open_stage(path, current_options().time)
+    opened = open_stage(path, current_options().time or 0.0)
     metres, is_z_up = _metres(opened), UsdGeom.GetStageUpAxis(opened.stage) == UsdGeom.Tokens.z
     ours = np.diag([metres, metres, metres, 1.0]) @ (_Y_FROM_Z if is_z_up else np.eye(4))
     images = Bitmaps(opened)

@@ -25,6 +25,8 @@ _IN_LAYER = re.compile(r"\S*/(\S+):(\d+):\d+:")
 _ASSET = re.compile(r"@[^@]*/([^@/]+)@")
 _GRAMMAR = re.compile(r"parse error matching .*", re.DOTALL)
 """How they quote the names of their own grammar."""
+_HARMLESS = re.compile("has deprecated version|MaterialBindingAPI is not applied")
+"""Warnings of what is read all the same."""
 _CONTEXT = " (instantiating stage"
 """With what the library's messages go on that tell of its memory."""
 
@@ -42,13 +44,19 @@ class OpenStage:
         """Where an asset that a layer names lies: a file, or one within a .usdz as "package[name]". It stays
         in the folder of the stage, unless the options let it. Raises InputError."""
         named = one_line(asset.path)[:80]
-        if not asset.resolvedPath:
+        resolved = asset.resolvedPath or self._of_windows(str(asset.path))
+        if not resolved:
             raise InputError(f"{named!r}: no such file; check the path")
-        found = outer_file(asset.resolvedPath)
+        found = outer_file(resolved)
         _check_inside(self.path, found)
         if found not in self.files and found != Path(os.path.abspath(self.path)):
             self.files.append(found)
-        return str(asset.resolvedPath)
+        return str(resolved)
+
+    def _of_windows(self, name: str) -> str:
+        """The file of a name with backslashes beside the stage; nothing, where there is none."""
+        path = os.path.abspath(self.path.parent / name.replace("\\", "/"))
+        return path if "\\" in name and os.path.isfile(path) else ""
 
 
 def outer_file(resolved: str) -> Path:
@@ -56,10 +64,9 @@ def outer_file(resolved: str) -> Path:
     return Path(Ar.SplitPackageRelativePathOuter(resolved)[0])
 
 
-def open_stage(path: Path, time: float | None) -> OpenStage:
-    """The stage of a file as it is `time` seconds after its first time code; where that is None, as it is at
-    the first time for which each thing has a value. Raises InputError: a file that consists of files outside
-    its folder, unless the options let it. Also what `plain_errors` is for."""
+def open_stage(path: Path, time: float) -> OpenStage:
+    """The stage of a file as it is `time` seconds after its first time code. Raises InputError: a file that
+    consists of files outside its folder, unless the options let it. Also what `plain_errors` is for."""
     layers = _checked_layers(path)
     stage = Usd.Stage.Open(layers[0], Usd.Stage.LoadAll)
     # Names that are computed may lead to other files in the whole than in a layer by itself.
@@ -77,9 +84,7 @@ def _check_inside(path: Path, file: Path) -> None:
     check_inside(path.parent, str(file))
 
 
-def _moment(stage: Any, time: float | None) -> Any:
-    if time is None:
-        return Usd.TimeCode.EarliestTime()
+def _moment(stage: Any, time: float) -> Any:
     start = stage.GetStartTimeCode() if stage.HasAuthoredTimeCodeRange() else 0.0
     code = start + time * stage.GetTimeCodesPerSecond()
     return Usd.TimeCode(max(-LARGEST, min(code, LARGEST)))
@@ -137,7 +142,9 @@ def plain_errors() -> Iterator[None]:
     finally:
         for diagnostic in delegate.TakeUncoalescedDiagnostics():
             with suppress(UnicodeDecodeError):  # Files may hold bytes that are no text.
-                import_report.left_out(one_line(diagnostic.commentary.split(_CONTEXT)[0]).rstrip("."))
+                text = one_line(diagnostic.commentary.split(_CONTEXT)[0]).rstrip(".")
+                if not _HARMLESS.search(text):
+                    import_report.left_out(_ASSET.sub(r"@\1@", text))
 
 
 def _first_of(error: Exception) -> str:

@@ -283,6 +283,18 @@ def test_point_instancers(tmp_path: Path) -> None:
     np.testing.assert_allclose(scene.object("a/many/1/ball").world_bounds, [[8, 5, -2], [12, 9, 2]])
 
 
+def test_point_instancers_that_move(tmp_path: Path) -> None:
+    """By their velocities, in units a second, from the last sample on."""
+    still = "point3f[] positions = [(0, 0, 0), (10, 0, 0), (20, 0, 0), (30, 0, 0)]"
+    moving = """point3f[] positions.timeSamples = { 0: [(0, 0, 0), (10, 0, 0), (20, 0, 0), (30, 0, 0)] }
+        vector3f[] velocities.timeSamples = { 0: [(4, 0, 0), (0, 0, 0), (0, 0, 0), (0, 0, 0)] }"""
+    assert still in POINTS
+    head = f"{METRES}\nstartTimeCode = 0\nendTimeCode = 24\ntimeCodesPerSecond = 24"
+    for time, x in ((None, 0), (0.5, 2)):
+        scene, _ = load_usda(tmp_path, POINTS.replace(still, moving), head, time=time)
+        assert scene.object("a/many/0/quad").world_from_object[0, 3] == pytest.approx(x)
+
+
 def test_point_instancers_within_each_other(tmp_path: Path) -> None:
     inner = POINTS.replace("many", "outer/group/many")
     inner = inner.replace('def PointInstancer "outer/group/many"', 'def PointInstancer "many"')

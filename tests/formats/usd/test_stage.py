@@ -11,9 +11,10 @@ import pytest
 from support.usd_files import METRES, QUAD_MESH, load_usda, write_usda
 
 from incpt.core.errors import InputError
-from incpt.formats import mesh_files, registry
+from incpt.formats import bitmaps, mesh_files, registry
 from incpt.formats.import_report import Fate
 from incpt.formats.registry import load_with_report
+from incpt.scene.texture import Bitmap
 
 pxr = pytest.importorskip("pxr")
 
@@ -106,6 +107,18 @@ def test_textures_outside_are_left_out(tmp_path: Path) -> None:
     body = preview_surface(color, uv_texture("../image.png")) + bound_quad()
     _, report = load_usda(tmp_path / "scene", body)
     assert "leads out of the folder" in report.of(Fate.LEFT_OUT)[0].text
+
+
+def test_names_of_windows_and_old_bindings(tmp_path: Path) -> None:
+    """Exporters write backslashes, and bind materials without the schema for it; nothing is lost."""
+    from support.usd_files import bound_quad, preview_surface, uv_texture
+
+    (tmp_path / "textures").mkdir()
+    bitmaps.write_bitmap(tmp_path / "textures" / "a.png", Bitmap(np.zeros((1, 1, 3), np.uint8)))
+    color = "color3f inputs:diffuseColor.connect = </look/image.outputs:rgb>"
+    quad = bound_quad().replace('(prepend apiSchemas = ["MaterialBindingAPI"])', "")
+    scene, report = load_usda(tmp_path, preview_surface(color, uv_texture(r".\textures\a.png")) + quad)
+    assert report.is_whole and scene.materials["look"].base_color_texture is not None
 
 
 def test_what_is_missing_is_said(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
