@@ -290,7 +290,7 @@ def _draw_notices(editor: Editor, area: Rect[float]) -> None:
     building = editor.rendering.building
     if building is not None and not editor.rendering.has_failed:
         notices.draw_building(building.done, building.total, area)
-    given_up = notices.draw_jobs([(job.label, job.seconds) for job in editor.jobs], area)
+    given_up = notices.draw_jobs([(job.label, job.seconds, job.share) for job in editor.jobs], area)
     if given_up is not None:
         editor.give_up_job(editor.jobs[given_up])
     waiting = editor.rendering.waiting

@@ -18,6 +18,7 @@ from incpt.core.errors import InputError, in_place
 from incpt.core.settings import RenderSettings
 from incpt.formats import images, placeholders, textures
 from incpt.formats.mesh_library import MeshLibrary
+from incpt.formats.reading_progress import each
 from incpt.formats.toml_kit import check_keys, quoted, read_toml, table_of, text_of
 from incpt.scene.camera import Camera
 from incpt.scene.environment import Environment
@@ -157,7 +158,7 @@ def _objects(tables: Any, materials: Mapping[str, Material], folder: Path) -> li
     library = MeshLibrary(folder)
     objects: list[Object] = []
     numbers: dict[str, int] = {}
-    for number, table in enumerate(tables, 1):
+    for number, table in enumerate(each(tables), 1):
         label = table.get("name") if isinstance(table, dict) else None
         shown = f" ({quoted(label)})" if isinstance(label, str) and label else ""
         with in_place(f"[[objects]] {number}{shown}"):

@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from incpt.formats.reading_progress import watched_by
+
 QUICK_SECONDS = 0.2
 """How long a job is waited for when it begins: most files are read by then, and nothing flickers."""
 
@@ -23,6 +25,8 @@ class Job:
         self._result: Any = None
         self._error: Exception | None = None
         self._began = time.monotonic()
+        self.share: float | None = None
+        """How much of it is done, from 0 to 1, once that is known."""
         self._thread = threading.Thread(target=self._run, name=label, daemon=True)
         self._thread.start()
 
@@ -46,8 +50,12 @@ class Job:
             raise self._error
         self._then(self._result)
 
+    def _note(self, share: float) -> None:
+        self.share = share
+
     def _run(self) -> None:
         try:
-            self._result = self._work()
+            with watched_by(self._note):
+                self._result = self._work()
         except Exception as error:  # It is raised where somebody can say it.
             self._error = error

@@ -113,19 +113,21 @@ def draw_notices(notices: Sequence[Notice], picture: Rect[float], now: float) ->
     return dismissed
 
 
-def draw_jobs(jobs: Sequence[tuple[str, float]], picture: Rect[float]) -> int | None:
-    """What is read, and for how many seconds, in the middle of the picture; returns the number of the one
-    that was given up. No reader tells how far it is, so the bar only tells that it is at work."""
+def draw_jobs(jobs: Sequence[tuple[str, float, float | None]], picture: Rect[float]) -> int | None:
+    """What is read, for how many seconds, and how much of it is done, in the middle of the picture; returns
+    the number of the one that was given up. Where it is not known yet how much, the bar tells that it is at
+    work."""
     if not jobs:
         return None
     place = imgui.ImVec2(picture.middle[0], picture.top + picture.height / 3)
     imgui.set_next_window_pos(place, imgui.Cond_.always, imgui.ImVec2(0.5, 0.5))
     given_up = None
     if imgui.begin("##jobs", None, _FLOATING)[0]:
-        for number, (label, seconds) in enumerate(jobs):
+        for number, (label, seconds, share) in enumerate(jobs):
             imgui.push_id(number)
             width = imgui.get_text_line_height() * _JOB_LINES
-            imgui.progress_bar(-imgui.get_time(), imgui.ImVec2(width, 0), f"{label}, {seconds:.0f} s")
+            done = -imgui.get_time() if share is None else share
+            imgui.progress_bar(done, imgui.ImVec2(width, 0), f"{label}, {seconds:.0f} s")
             places.note(f"job {number}")
             imgui.same_line()
             if widgets.button("Give up##job"):

@@ -28,6 +28,7 @@ from incpt.formats.import_options import current_options
 from incpt.formats.import_report import counted
 from incpt.formats.names import Names
 from incpt.formats.placement import placed_arrays, transform_of
+from incpt.formats.reading_progress import each
 from incpt.formats.shared_meshes import MOST_PARTS, bounds_of, settled
 from incpt.scene.camera import Camera
 from incpt.scene.mesh import Mesh, MeshSource
@@ -108,7 +109,7 @@ class _Parts:
             raise InputError(f"shows more than {MOST_PARTS:,} meshes; split it")
         if not placed and self._without_area:
             raise InputError(f"has no usable face (no {' or '.join(self._without_area)} have area)")
-        parts = [part for one in placed if (part := self._part(one)) is not None]
+        parts = [part for one in each(placed) if (part := self._part(one)) is not None]
         tell_of_faces(self._counts)
         if len(placed) == 1:
             parts = [replace(parts[0], name=None)]

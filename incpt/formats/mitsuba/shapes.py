@@ -16,6 +16,7 @@ from incpt.formats.mitsuba.materials import Materials, Surface
 from incpt.formats.mitsuba.meshes import FILES, Meshes
 from incpt.formats.mitsuba.node import Node
 from incpt.formats.names import Names
+from incpt.formats.reading_progress import each
 from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh
 from incpt.scene.model import Object
@@ -52,7 +53,7 @@ class Shapes:
     def objects(self, root: Node) -> tuple[Object, ...]:
         """Of all shapes of the scene. Raises InputError."""
         found: list[Object] = []
-        for node in root.objects_of("shape"):
+        for node in each(list(root.objects_of("shape"))):
             with in_place(node.place):
                 if node.kind == "shapegroup":
                     continue

@@ -20,6 +20,7 @@ from incpt.formats.pbrt.document import Document, Placed
 from incpt.formats.pbrt.materials import Materials
 from incpt.formats.pbrt.parameters import Statement
 from incpt.formats.placement import turned_over
+from incpt.formats.reading_progress import each
 from incpt.formats.vertex_attributes import VertexAttributes
 from incpt.scene.material import Material
 from incpt.scene.mesh import Mesh, MeshSource
@@ -57,7 +58,7 @@ class Shapes:
 
     def objects(self) -> tuple[Object, ...]:
         """Raises InputError."""
-        pieces = [piece for shape in self._document.shapes for piece in self._pieces(shape)]
+        pieces = [piece for shape in each(self._document.shapes) for piece in self._pieces(shape)]
         found = [one for piece in pieces if (one := self._object(piece)) is not None]
         for placed in self._document.instances:
             found += self._instance(placed)

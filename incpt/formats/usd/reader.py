@@ -19,6 +19,7 @@ from incpt.formats.import_options import current_options
 from incpt.formats.import_report import counted
 from incpt.formats.names import Names
 from incpt.formats.placement import placed_mesh, transform_of
+from incpt.formats.reading_progress import each
 from incpt.formats.shared_meshes import MOST_PARTS, bounds_of, settled
 from incpt.formats.usd import meshes, solids
 from incpt.formats.usd.cameras import camera_of
@@ -54,7 +55,7 @@ def _read(path: Path) -> MeshFile:
     images = Bitmaps(opened)
     walk, lights = Walk(opened), Lights(images, ours, metres, is_z_up)
     parts, places = _Parts(opened, Materials(images), ours), []
-    for place in walk.places():
+    for place in each(list(walk.places())):
         if is_light(place.prim):
             lights.read(place)
         elif place.prim.IsA(UsdGeom.Camera):

@@ -30,7 +30,7 @@ from incpt.ui.dialogs.relink_dialog import RelinkDialog
 from incpt.ui.editor import clipboard, job
 from incpt.ui.editor.document import Document, new_scene
 from incpt.ui.editor.recovery import LeftBehind, Recovery
-from incpt.ui.panels import textures
+from incpt.ui.panels import notices, textures
 from incpt.viewer.renderer import Export
 
 SCENE = mixed_scene(size=(48, 32)).with_environment(image=None)
@@ -672,6 +672,27 @@ def test_a_mesh_is_read_while_the_window_goes_on(user: Desk, tmp_path: Path, gat
     assert not user.shows("job 0") and user.editor.selection.names == ("box",) and user.undo_count == 2
     user.key("Ctrl+Z")
     assert "cube" in user.scene.object_index and "box" not in user.scene.object_index
+
+
+def test_how_far_reading_is_is_shown(user: Desk, tmp_path: Path, gate: threading.Event) -> None:
+    """The bar of a job whose reader has told it stands still; before, it runs to and fro."""
+    trimesh.creation.box().export(tmp_path / "box.glb")
+    files.drop(user.editor, tmp_path / "box.glb")
+    (begun,) = user.editor.jobs
+    assert begun.share is None
+    shown: list[float] = []
+    bar = notices.imgui.progress_bar
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            notices.imgui, "progress_bar", lambda share, *rest: (shown.append(share), bar(share, *rest))[1]
+        )
+        user.frames(2)
+        begun._note(0.25)
+        user.frames(2)
+    assert shown[0] < 0 and shown[-1] == 0.25
+    gate.set()
+    come_to_an_end(user)
+    assert begun.share == 0
 
 
 def test_reading_is_given_up(user: Desk, tmp_path: Path, gate: threading.Event) -> None:
