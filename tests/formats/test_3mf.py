@@ -206,8 +206,8 @@ def test_what_is_not_read_is_told(tmp_path: Path) -> None:
     path = written(tmp_path, model(group + solid(1, 'pid="3" p1="0"', "", "", ""), build))
     assert told(path) == [
         "1 element <beam> of /3D/3dmodel.model: nothing here is like them",
-        "properties 3 of /3D/3dmodel.model: are no colours, materials or images",
         "object 9 of /3D/3dmodel.model: is not in the file",
+        "properties 3 of /3D/3dmodel.model: are no colours, materials or images",
         "object 'object 1': its placement flattens it",
     ]
 

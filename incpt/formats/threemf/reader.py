@@ -17,6 +17,7 @@ from incpt.formats.import_report import counted
 from incpt.formats.names import Names
 from incpt.formats.orientation import ROTATIONS
 from incpt.formats.placement import transform_of
+from incpt.formats.reading_progress import each
 from incpt.formats.threemf.model import GREY, NOTHING, Key, Model, Placed, Solid, read_part
 from incpt.formats.threemf.package import Package
 from incpt.formats.vertex_attributes import NO_ATTRIBUTES, VertexAttributes, material_of_colors
@@ -87,7 +88,8 @@ class _Parts:
         turn = Transform(rotation=ROTATIONS["z"], scale=(unit, unit, unit)).world_from_object
         upright = np.vstack([turn, [0, 0, 0, 1]])
         parts: list[MeshPart] = []
-        for one in self._built():
+        # All are counted before the first is made, which takes longer.
+        for one in each(list(self._built())):
             parts += self._part(one, upright)
             _check_count(len(parts))
         tell_of_faces(self._counts)
