@@ -6,6 +6,7 @@ import base64
 import json
 import struct
 import warnings
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -361,10 +362,22 @@ def test_stored_meshes_are_checked(tmp_path: Path) -> None:
         mesh_files.load_mesh(tmp_path / "b.npz")
 
 
+def write_usda(path: Path) -> None:
+    points = ", ".join(str(tuple(point)) for point in TETRAHEDRON.tolist())
+    corners = ", ".join(map(str, TETRAHEDRON_FACES.ravel().tolist()))
+    path.write_text(
+        f'#usda 1.0\ndef Mesh "m"\n{{\npoint3f[] points = [{points}]\nint[] faceVertexCounts = [3, 3, 3, 3]\n'
+        f"int[] faceVertexIndices = [{corners}]\n}}\n"
+    )
+
+
+SUFFIXES = ["ply", "obj", "stl", "glb", "gltf", "off", "npz", *(["usda"] if find_spec("pxr") else [])]
+
+
 @pytest.mark.slow
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
-    suffix=st.sampled_from(["ply", "obj", "stl", "glb", "gltf", "off", "npz"]),
+    suffix=st.sampled_from(SUFFIXES),
     places=st.lists(st.tuples(st.floats(0, 1), st.integers(0, 255)), max_size=6),
     cut=st.floats(0, 1),
 )
@@ -376,6 +389,8 @@ def test_damaged_files_raise_input_errors_or_load(
         mesh_store.store_mesh(path, shape("cube"))
     elif suffix == "gltf":
         write_gltf(path)
+    elif suffix == "usda":
+        write_usda(path)
     else:
         trimesh.creation.box().export(path)
     content = bytearray(path.read_bytes())
@@ -387,13 +402,19 @@ def test_damaged_files_raise_input_errors_or_load(
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
-    suffix=st.sampled_from(["ply", "obj", "stl", "glb", "gltf", "off", "npz"]),
+    suffix=st.sampled_from(SUFFIXES),
     content=st.binary(max_size=300),
 )
 def test_garbage_raises_input_errors(tmp_path: Path, suffix: str, content: bytes) -> None:
     path = tmp_path / f"garbage.{suffix}"
     path.write_bytes(
-        {"ply": b"ply\n", "off": b"OFF\n", "glb": struct.pack("<4sI", b"glTF", 2)}.get(suffix, b"") + content
+        {
+            "ply": b"ply\n",
+            "off": b"OFF\n",
+            "usda": b"#usda 1.0\n",
+            "glb": struct.pack("<4sI", b"glTF", 2),
+        }.get(suffix, b"")
+        + content
     )
     check_loads_or_explains(path)
 

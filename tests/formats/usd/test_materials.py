@@ -19,7 +19,7 @@ from support.usd_files import (
     write_usda,
 )
 
-from incpt.formats import bitmaps
+from incpt.formats import bitmaps, registry, scene_save
 from incpt.formats.import_report import Fate, ImportReport
 from incpt.formats.registry import load_with_report
 from incpt.scene.material import Material
@@ -331,6 +331,9 @@ def test_images_in_archives(tmp_path: Path) -> None:
     source = texture.bitmap.source
     assert source.file == str(path) and source.index is not None
     assert bitmaps.load_bitmap(path, source.index) is texture.bitmap
+    scene_save.save(scene, tmp_path / "saved.toml")
+    again = registry.load(tmp_path / "saved.toml")
+    assert again.materials == scene.materials and again.objects[0].mesh is scene.objects[0].mesh
 
 
 def test_materials_of_subsets(tmp_path: Path) -> None:
