@@ -58,13 +58,18 @@ def test_concave_polygons_keep_their_notch(tmp_path: Path) -> None:
 
 
 def test_left_handed_faces_are_turned_over(tmp_path: Path) -> None:
-    mesh = mesh_of(tmp_path, 'uniform token orientation = "leftHanded"')
+    """With what they have at their corners."""
+    st = 'texCoord2f[] primvars:st = [(0, 0), (1, 0), (1, 1), (0, 1)] (interpolation = "faceVarying")'
+    mesh = mesh_of(tmp_path, f'uniform token orientation = "leftHanded"\n{st}')
     np.testing.assert_allclose(face_normals(mesh), np.broadcast_to([0, 0, -1], (2, 3)))
+    corners = mesh.vertices[mesh.faces][..., :2]
+    np.testing.assert_allclose(mesh.uvs[0], (corners * [1, -1] + 1) / 2, atol=1e-6)
 
 
 def test_holes_are_no_faces(tmp_path: Path) -> None:
     two = QUAD.replace("[4]", "[3, 3]").replace("[0, 1, 2, 3]", "[0, 1, 2, 0, 2, 3]")
-    assert area(mesh_of(tmp_path, "int[] holeIndices = [1]", two)) == pytest.approx(2)
+    mesh = mesh_of(tmp_path, "int[] holeIndices = [1]", two)
+    np.testing.assert_allclose(mesh.vertices[mesh.faces].mean(axis=(0, 1)), (1 / 3, -1 / 3, 0), atol=1e-6)
 
 
 def test_normals_of_any_interpolation(tmp_path: Path) -> None:
