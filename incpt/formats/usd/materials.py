@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from pxr import UsdGeom, UsdShade
 
-from incpt.core.errors import InputError
+from incpt.core.errors import InputError, in_place
 from incpt.formats import import_report
 from incpt.formats.appearance.colored import WHITE, Amount, Colored, as_reflectance, vector
 from incpt.formats.appearance.looks import Look, metal_and_roughness, tinted, upright, with_alpha
@@ -28,8 +28,6 @@ SURFACE = "UsdPreviewSurface"
 _READERS = ("UsdPrimvarReader_float3", "UsdPrimvarReader_float4", "UsdPrimvarReader_float")
 _PLAIN_ROUGHNESS = 0.6
 """Of meshes without a material, as in all mesh files."""
-
-
 _CLEAR: Look = {
     "base_color": WHITE, "base_color_texture": None, "metallic": 0.0, "metallic_roughness_texture": None,
     "transmission": 1.0, "thin_walled": True,
@@ -90,7 +88,8 @@ class Materials:
             import_report.left_out(f"material {label!r}: its shader is {kind}, not {SURFACE}")
             return None
         reader = _Reader(Inputs(shader, self._images.moment), label, self._images)
-        made = Material(**reader.look())
+        with in_place(f"material {label!r}"):
+            made = Material(**reader.look())
         wanted = Wanted(tuple(reader.textures.uv_names), reader.color_name, reader.opacity_name)
         return Surface(self._names.new(label), made, wanted)
 

@@ -27,7 +27,7 @@ from incpt.formats.usd.lights import Lights, is_light
 from incpt.formats.usd.materials import Materials, Surface
 from incpt.formats.usd.memory import bounded_memory
 from incpt.formats.usd.meshes import Polygons
-from incpt.formats.usd.skinning import bent_points
+from incpt.formats.usd.skinning import bent_meshes
 from incpt.formats.usd.stage import OpenStage, open_stage, plain_errors
 from incpt.formats.usd.textures import Bitmaps
 from incpt.formats.usd.walk import Place, Walk
@@ -115,17 +115,18 @@ class _Parts:
         self._polygons: tuple[str, Polygons | None] = ("", None)
         self._counts: dict[str, int] = {}
         self._unread: Counter[str] = Counter()
-        self._bent = bent_points(opened)
+        bent = bent_meshes(opened)
+        self._bent = bent.points
         self._labels, self._names = Names(), Names()
         self._found: list[MeshPart] = []
         self._cages = 0
-        self.moves = False
+        self.moves = bent.moves
 
     def read(self, place: Place) -> None:
         """What stands at a place, if it has area. Raises InputError: too many."""
         prim = place.prim
         if prim.IsA(UsdGeom.Mesh):
-            self.moves = self.moves or place.key in self._bent or meshes.moves(prim)
+            self.moves = self.moves or meshes.moves(prim)
             self._read_mesh(place)
         elif solids.is_solid(prim):
             self._read_solid(place)

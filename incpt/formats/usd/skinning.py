@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,17 +17,26 @@ from incpt.formats.usd.stage import OpenStage
 Points = npt.NDArray[np.float64]
 
 
-def bent_points(opened: OpenStage) -> dict[str, Points]:
-    """The points (V, 3) of meshes that skeletons bend, in the space of each mesh, by the path of its prim.
-    What bends the meshes of instances is left out, and told."""
+@dataclass(frozen=True, eq=False)
+class Bent:
+    """The points (V, 3) of meshes that skeletons bend, in the space of each mesh, by the path of its prim;
+    and whether any of these skeletons moves."""
+
+    points: dict[str, Points]
+    moves: bool
+
+
+def bent_meshes(opened: OpenStage) -> Bent:
+    """What skeletons do to meshes. What bends the meshes of instances is left out, and told."""
     roots = [prim for prim in Usd.PrimRange.Stage(opened.stage) if prim.IsA(UsdSkel.Root)]
     cache, spaces = UsdSkel.Cache(), UsdGeom.XformCache(opened.moment)
     found: dict[str, Points] = {}
-    failed = 0
+    failed, moves = 0, False
     for prim in roots:
         root = UsdSkel.Root(prim)
         cache.Populate(root, Usd.PrimDefaultPredicate)
         for binding in cache.ComputeSkelBindings(root, Usd.PrimDefaultPredicate):
+            moves = moves or _moves(cache.GetSkelQuery(binding.GetSkeleton()).GetAnimQuery())
             for target, points in _targets(binding, cache, opened.moment):
                 if points is None:
                     failed += 1
@@ -36,7 +46,18 @@ def bent_points(opened: OpenStage) -> dict[str, Points]:
     if failed:
         import_report.left_out(f"the skeletons of {counted(failed, 'mesh')}: do not fit, it is as at rest")
     _tell_of_instances(opened.stage)
-    return found
+    return Bent(found, moves)
+
+
+def _moves(animation: Any) -> bool:
+    """Whether an animation has different values at different times."""
+    if not animation:
+        return False
+    joints, shapes = (
+        animation.JointTransformsMightBeTimeVarying,
+        animation.BlendShapeWeightsMightBeTimeVarying,
+    )
+    return bool(joints() or shapes())
 
 
 def _targets(binding: Any, cache: Any, moment: Any) -> Iterator[tuple[Any, Points | None]]:

@@ -446,8 +446,16 @@ def test_skeletons_bend_meshes(tmp_path: Path) -> None:
     # Half of the way of the one joint, half of the blend shape, wherever the mesh itself stands.
     expected = [(-1, -1, 2), (1.5, -1, 2), (1, 1, 0), (-1, 1, 0)]
     np.testing.assert_allclose(affine.apply(bent.world_from_object, bent.mesh.vertices), expected, atol=1e-5)
-    rest = load_usda(tmp_path, SKINNED, head)[0].objects[0]
-    np.testing.assert_allclose(rest.world_bounds[:, 2], 0, atol=1e-5)
+    scene, report = load_usda(tmp_path, SKINNED, head)
+    np.testing.assert_allclose(scene.objects[0].world_bounds[:, 2], 0, atol=1e-5)
+    assert [one.text for one in report.of(Fate.LEFT_OUT)] == [
+        "animation: nothing moves without --time (`time` in Python)"
+    ]
+    posed = SKINNED.replace(
+        "translations.timeSamples = { 0: [(0, 0, 0)], 24: [(0, 0, 4)] }", "translations = [(0, 0, 4)]"
+    )
+    scene, report = load_usda(tmp_path, posed, head)
+    assert report.is_whole and scene.objects[0].world_bounds[1, 2] == pytest.approx(4)
 
 
 def moving(folder: Path, time: float | None) -> tuple[Scene, list[str]]:
