@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,19 +28,13 @@ from incpt.cli.options import (
     padded_pixels,
     settings_from,
 )
-from incpt.core.errors import InputError, OutputError
+from incpt.core.errors import InputError
 from incpt.core.settings import CUT_OFF_WORTH_TELLING, STRATEGIES
 
 if TYPE_CHECKING:
-    import numpy as np
-    import numpy.typing as npt
-
-    from incpt.picture.denoise import NoiseGauge
+    from incpt.render.final import FinalRender
     from incpt.render.session import Session, StepReport
     from incpt.scene.model import Scene
-
-_LOOKS = (8, 4, 2)
-"""The parts of the samples after which a picture is looked at, to tell how noisy it is."""
 
 
 def render(
@@ -101,14 +94,13 @@ def render(
     device: DeviceOption = None,
 ) -> None:
     """Render a scene to a picture. Ctrl-C keeps what is done."""
-    from incpt.picture import denoise as denoising
+    from incpt.render.final import FinalRender, FinalSettings
     from incpt.render.session import Session
 
-    _check_picture_path(output)
     if aovs and output.suffix.lower() != ".exr":
         raise InputError(f"--aovs: {output} cannot hold them; use an .exr")
-    if denoise:
-        denoising.require_denoiser()
+    wanted = FinalSettings(output, spp, aovs=aovs, denoise=denoise)
+    wanted.check_place()
     asked = import_options(
         up, unit, define, clip=clip, allow_outside=allow_outside, allow_missing=allow_missing
     )
@@ -126,48 +118,37 @@ def render(
                 max_bounces=max_bounces,
                 texture_limit=texture_limit,
             )
-            settings = replace(
-                settings, aovs=settings.aovs or aovs, transparent=settings.transparent or transparent
-            )
-            with_aovs = settings.aovs
+            settings = replace(settings, transparent=settings.transparent or transparent)
+            wanted = replace(wanted, aovs=aovs or settings.aovs)
             if frames is not None:
                 # They are pictures of their own: nothing of the one before is kept.
                 settings = replace(settings, strategy="restart")
-            # Base colours and normals help a denoiser.
-            session = Session(scene, settings=replace(settings, aovs=with_aovs or denoise), device=device)
+            session = Session(scene, settings=wanted.of_session(settings), device=device)
         else:
             session.edit(_seen_as(session.scene, scene))
-        _render_picture(session, path, spp, with_aovs, denoise)
+        _render_picture(FinalRender(session, replace(wanted, path=path)))
 
 
-def _render_picture(session: Session, output: Path, spp: int, with_aovs: bool, denoise: bool) -> None:
+def _render_picture(final: FinalRender) -> None:
     """Raises Stopped after Ctrl-C, with what is done in the file."""
-    from incpt.picture import denoise as denoising
-    from incpt.render.export import write_picture
-
-    pixels, tally, gauge = padded_pixels(session.settings), _Tally(), denoising.NoiseGauge()
+    session, spp = final.session, final.wanted.spp
+    pixels, tally = padded_pixels(session.settings), _Tally()
     with interruption() as stop, path_progress("rendering", spp * pixels, pixels) as progress:
-
-        def on_step(report: StepReport) -> None:
-            tally.add(report)
-            progress.advance(report.paths)
-            stop.check()
-
         try:
-            for part in _LOOKS if denoise else ():
-                session.render(spp // part, on_step)
-                gauge.look(session.image(), session.spp())
-            session.render(spp, on_step)
+            while not final.is_done:
+                report = final.step()
+                tally.add(report)
+                progress.advance(report.paths)
+                stop.check()
         except KeyboardInterrupt:
             if not stop.requested:
                 raise
         # Still inside, so that another Ctrl-C does not tear the picture that is kept.
-        write_picture(output, session, with_aovs, denoised=_denoised(session, gauge) if denoise else None)
-    samples = int(session.spp().min())
+        final.write()
     tally.complain()
-    print(f"{output}: {session.size[0]} x {session.size[1]}, {samples} samples per pixel")
+    print(f"{final.wanted.path}: {session.size[0]} x {session.size[1]}, {final.spp} samples per pixel")
     if stop.requested:
-        raise Stopped(f"stopped at {samples} of {spp} samples per pixel")
+        raise Stopped(f"stopped at {final.spp} of {spp} samples per pixel")
 
 
 def _seen_as(first: Scene, scene: Scene) -> Scene:
@@ -229,31 +210,3 @@ class _Tally:
         if self.cut_off > CUT_OFF_WORTH_TELLING * self.paths:
             share = 100 * self.cut_off / self.paths
             complain(f"warning: {share:.1f} % of the paths ended in glass; raise transmission_bounces", 0)
-
-
-def _denoised(session: Session, gauge: NoiseGauge) -> npt.NDArray[np.float32]:
-    """(H, W, 3) the picture with as much of a denoised one as its noise asks for."""
-    from incpt.picture import denoise
-
-    image = session.image()
-    gauge.look(image, session.spp())
-    clean = denoise.denoise(image, session.pass_image("albedo"), session.pass_image("normal"))
-    return denoise.mixed(image, clean, gauge.variance())
-
-
-def _check_picture_path(path: Path) -> None:
-    """Before the long work: a suffix that names a format, and a place that can be written."""
-    from incpt.render.export import SUFFIXES
-
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"-o {path}: ends in no known format; use .exr or .png")
-    if path.is_dir():
-        raise OutputError(f"{path}: is a folder; name a file in it")
-    _check_folder(path.parent)
-
-
-def _check_folder(folder: Path) -> None:
-    if not folder.is_dir():
-        raise OutputError(f"{folder}: no such folder; make it first")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise OutputError(f"{folder}: cannot be written; choose another folder")

@@ -193,8 +193,8 @@ def test_samples_that_are_not_finite_are_told(
 ) -> None:
     step = Session.step
 
-    def step_with_bad_samples(self: Session) -> StepReport:
-        report = step(self)
+    def step_with_bad_samples(self: Session, slots: int | None = None) -> StepReport:
+        report = step(self, slots)
         return StepReport(**{**vars(report), "nonfinite": 7})
 
     monkeypatch.setattr(Session, "step", step_with_bad_samples)
