@@ -1,7 +1,8 @@
 """What passes between an editor and its renderer: requests go in, messages come out.
 
 Requests for the picture itself (Export, Copy, Pin) wait until it is whole: at full resolution, and with
-nothing left of an edit that it does not show yet. Waiting tells which do.
+nothing left of an edit that it does not show yet. Waiting tells which do. RenderFinal is for another picture,
+which is rendered beside it.
 
 `Renderer` is all that an editor needs; `threaded.ThreadedRenderer` is one.
 """
@@ -15,6 +16,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from incpt.render.final import FinalSettings
+from incpt.scene.model import Scene
 from incpt.viewer.view import Frame, View
 
 
@@ -79,7 +82,23 @@ class Restart:
     """Throw away what was accumulated."""
 
 
-Request = Pick | PickBox | Export | Copy | Pin | TakeNow | Forget | Restart
+@dataclass(frozen=True)
+class RenderFinal:
+    """Render `scene` into a file, after others that were asked for before. The view goes on meanwhile, and an
+    edit is answered first."""
+
+    scene: Scene
+    wanted: FinalSettings
+
+
+@dataclass(frozen=True)
+class EndFinal:
+    """End the final render under way: `is_kept`, what is done is written, else it is given up."""
+
+    is_kept: bool
+
+
+Request = Pick | PickBox | Export | Copy | Pin | TakeNow | Forget | Restart | RenderFinal | EndFinal
 
 
 @dataclass(frozen=True)
@@ -130,6 +149,26 @@ class Waiting:
 
 
 @dataclass(frozen=True)
+class FinalProgress:
+    """How far a final render is: the file that it will be in, the `share` of it that is done, from 0 to 1,
+    the samples of the pixel that has the fewest, for how many seconds it has rendered, and how many others
+    wait for it."""
+
+    path: Path
+    share: float
+    spp: int
+    seconds: float
+    waiting: int
+
+
+@dataclass(frozen=True)
+class Finals:
+    """The final render under way; None: there is none any more."""
+
+    current: FinalProgress | None
+
+
+@dataclass(frozen=True)
 class Problem:
     """One line that names the place and the fix. After a fatal one the renderer does nothing more."""
 
@@ -137,7 +176,7 @@ class Problem:
     fatal: bool = False
 
 
-Message = Frame | Building | Picked | PickedBox | Exported | CopiedPicture | Waiting | Problem
+Message = Frame | Building | Picked | PickedBox | Exported | CopiedPicture | Waiting | Finals | Problem
 
 
 class Renderer(Protocol):
@@ -152,7 +191,7 @@ class Renderer(Protocol):
         ...
 
     def poll(self) -> list[Message]:
-        """What came since the last call; of Frames, and of Buildings, the latest only."""
+        """What came since the last call; of Frames, of Buildings and of Finals, the latest only."""
         ...
 
     def close(self) -> None:

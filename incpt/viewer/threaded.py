@@ -18,12 +18,15 @@ from incpt.core.errors import DeviceError, InputError, OutputError, one_line
 from incpt.device.device import Device
 from incpt.scene.model import Scene
 from incpt.viewer.denoising import DenoisingThread
+from incpt.viewer.finals import FinalQueue
 from incpt.viewer.renderer import (
     Building,
     CopiedPicture,
     Copy,
+    EndFinal,
     Export,
     Exported,
+    Finals,
     Forget,
     Message,
     Pick,
@@ -32,6 +35,7 @@ from incpt.viewer.renderer import (
     PickedBox,
     Pin,
     Problem,
+    RenderFinal,
     Request,
     TakeNow,
     Waiting,
@@ -98,7 +102,7 @@ class ThreadedRenderer:
 
     def _post(self, message: Message) -> None:
         with self._condition:
-            if isinstance(message, Frame | Building):
+            if isinstance(message, Frame | Building | Finals):
                 self._messages = [m for m in self._messages if type(m) is not type(message)]
             self._messages.append(message)
         self._wake()
@@ -157,9 +161,10 @@ class ThreadedRenderer:
         if self._view is None:
             return
         viewer = Viewer(self._view, device, self._report_building)
+        finals = FinalQueue(device, self._post, self._report_building, _explain)
         while not self._closing:
             view = self._view
-            self._answer_all(viewer, view)
+            self._answer_all(viewer, finals, view)
             try:
                 frame = viewer.advance(view, partial(self._has_edit_after, view))
             except RenderingStoppedError:
@@ -167,13 +172,14 @@ class ThreadedRenderer:
             except (InputError, DeviceError, MemoryError) as error:
                 self._post(Problem(_explain(error)))
                 continue
-            if frame is None:
-                if not viewer.prepare():
-                    self._wait_for_news(view)
-            elif self._is_worth_showing(frame):
+            if frame is not None and self._is_worth_showing(frame):
                 self._post(self._denoiser.shown(frame))
                 if viewer.device.is_cpu:
                     self._let_draw(frame)
+            if not finals.is_idle and viewer.has_answered and not self._has_edit_after(view):
+                finals.advance(view.step_ms / 1e3)
+            elif frame is None and not viewer.prepare():
+                self._wait_for_news(view)
 
     def _let_draw(self, frame: Frame) -> None:
         """In a drag, leave the processor to the window while it draws the first picture of an edit: on
@@ -189,7 +195,7 @@ class ThreadedRenderer:
                 lambda: self._closing or bool(self._requests) or self._has_edit_after(view), DRAWING_SECONDS
             )
 
-    def _answer_all(self, viewer: Viewer, view: View) -> None:
+    def _answer_all(self, viewer: Viewer, finals: FinalQueue, view: View) -> None:
         """Answer what was asked, but for what waits until the picture of the view is whole."""
         before = list(self._waiting)
         for request in self._take_requests():
@@ -200,6 +206,10 @@ class ThreadedRenderer:
                     self._answer_waiting(viewer)
                 case Forget():
                     self._waiting = []
+                case RenderFinal():
+                    finals.add(request)
+                case EndFinal():
+                    finals.end(request.is_kept)
                 case _:
                     if isinstance(request, Pin):
                         self._waiting = [one for one in self._waiting if not isinstance(one, Pin)]

@@ -182,6 +182,14 @@ class Viewer:
         """Whether the picture is at full resolution, and one of the scene of `view` alone."""
         return scheduler.is_whole(self._main, view)
 
+    @property
+    def has_answered(self) -> bool:
+        """Whether nobody waits for the answer to an edit: there is a picture of the scene as it is wanted, or
+        rendering is paused, and nothing is dragged."""
+        view = self._state.view
+        is_shown = scheduler.shows(self._main, view) and self._main.is_answered
+        return view.before is None and (is_shown or view.paused)
+
     def _fill(self) -> None:
         """Bring the picture to full resolution, with a sample in each pixel."""
         place, main = len(self._seats) - 1, self._main
