@@ -56,7 +56,9 @@ class Workspace:
         status = notices.status_text(
             editor.frame, editor.control.paused, editor.selection, editor.viewing.is_free
         )
-        notices.draw_status_bar(editor.gesture.hint or status)
+        asked = notices.draw_status_bar(editor.gesture.hint or status, editor.rendering.final)
+        if asked is not None:
+            pictures.end_final(editor, is_kept=asked == "keep")
         area = self._layout.dock(editor.screen.wants_first_layout)
         editor.screen = replace(editor.screen, wants_first_layout=False)
         if editor.screen.is_renaming:

@@ -20,6 +20,8 @@ from incpt.viewer.renderer import Exported, FinalProgress, Finals, Message, Prob
 
 _TELLING_SECONDS = 0.25
 """The time between two words about how far it is, since a window redraws for each."""
+_FORETOLD_FROM = 2.0
+"""The seconds after which it is told how long a final render will take."""
 _REFUSALS = (InputError, DeviceError, OutputError, MemoryError)
 
 
@@ -38,7 +40,7 @@ class FinalQueue:
         self._waiting: deque[RenderFinal] = deque()
         self._current: FinalRender | None = None
         self._pace = Pace(5e5 if device.is_cpu else 5e7)
-        self._told_at = 0.0
+        self._told_at = self._began_at = 0.0
 
     @property
     def is_idle(self) -> bool:
@@ -64,6 +66,7 @@ class FinalQueue:
         try:
             if self._current is None:
                 self._current = self._opened(self._waiting.popleft())
+                self._began_at = time.perf_counter()
                 self._tell()
                 return
             self._step(self._current, seconds)
@@ -99,14 +102,18 @@ class FinalQueue:
             self._post(Exported(current.wanted.path, current.session.size))
 
     def _tell(self) -> None:
-        current, self._told_at = self._current, time.perf_counter()
+        current, self._told_at, waiting = self._current, time.perf_counter(), len(self._waiting)
         if current is not None:
+            path, share = current.wanted.path, current.share
             progress = FinalProgress(
-                current.wanted.path, current.share, current.spp, current.seconds, len(self._waiting)
+                path, share, current.spp, current.seconds, self._seconds_left(share), waiting
             )
             self._post(Finals(progress))
         elif self._waiting:
-            path, others = self._waiting[0].wanted.path, len(self._waiting) - 1
-            self._post(Finals(FinalProgress(path, 0.0, 0, 0.0, others)))
+            self._post(Finals(FinalProgress(self._waiting[0].wanted.path, waiting=waiting - 1)))
         else:
             self._post(Finals(None))
+
+    def _seconds_left(self, share: float) -> float | None:
+        past = time.perf_counter() - self._began_at
+        return past * (1 - share) / share if share > 0 and past >= _FORETOLD_FROM else None

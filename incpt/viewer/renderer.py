@@ -150,15 +150,23 @@ class Waiting:
 
 @dataclass(frozen=True)
 class FinalProgress:
-    """How far a final render is: the file that it will be in, the `share` of it that is done, from 0 to 1,
-    the samples of the pixel that has the fewest, for how many seconds it has rendered, and how many others
-    wait for it."""
+    """How far a final render is.
+
+    path     the file that it will be in.
+    share    how much of it is done, from 0 to 1.
+    spp      samples of the pixel that has the fewest.
+    seconds  how long it has rendered.
+    left     seconds until its end, if the view goes on taking as much of the device as so far; None: nobody
+             knows yet.
+    waiting  how many others come after it.
+    """
 
     path: Path
-    share: float
-    spp: int
-    seconds: float
-    waiting: int
+    share: float = 0.0
+    spp: int = 0
+    seconds: float = 0.0
+    left: float | None = None
+    waiting: int = 0
 
 
 @dataclass(frozen=True)

@@ -173,12 +173,23 @@ def _add_file(editor: Editor, path: Path) -> None:
 
 
 def quit_(editor: Editor) -> None:
-    """Close the window, once unsaved changes are cared for."""
+    """Close the window, once unsaved changes and a final render under way are cared for."""
 
     def close() -> None:
         editor.screen = replace(editor.screen, is_closing=True)
 
-    _when_saved(editor, close)
+    def close_if_idle() -> None:
+        final = editor.rendering.final
+        if final is None:
+            close()
+            return
+        editor.dialog = Question(
+            "A picture is being rendered",
+            f"{final.path.name} is not done yet.",
+            (Choice("Give up and quit", Answer(close)), Choice("Keep rendering", Answer())),
+        )
+
+    _when_saved(editor, close_if_idle)
 
 
 def offer_recovery(editor: Editor, kept: Recovery) -> None:
@@ -206,8 +217,12 @@ def ask_path(
     name: str = "",
 ) -> None:
     """Ask for a file, and do something with it. `name` is a file to propose, in the document's own folder."""
-    start = editor.document.path.parent if editor.document.path is not None else Path.cwd()
-    editor.dialog = PathDialog(title, kind, is_saving, start, then, name)
+    editor.dialog = PathDialog(title, kind, is_saving, folder(editor), then, name)
+
+
+def folder(editor: Editor) -> Path:
+    """Where files beside the document go."""
+    return editor.document.path.parent if editor.document.path is not None else Path.cwd()
 
 
 def stem(editor: Editor) -> str:

@@ -30,9 +30,9 @@ def end() -> None:
     imgui.end_popup()
 
 
-def buttons(labels: Sequence[str]) -> int | None:
+def buttons(labels: Sequence[str], takes_keys: bool = True) -> int | None:
     """Buttons in a row at the right; returns the index of the one that was pressed. Enter presses the first,
-    Escape the last."""
+    Escape the last, unless the keys of this frame are for something else."""
     style = imgui.get_style()
     least = _LEAST_BUTTON * style.font_scale_dpi
     widths = [max(imgui.calc_text_size(label).x + 2 * style.frame_padding.x, least) for label in labels]
@@ -48,6 +48,8 @@ def buttons(labels: Sequence[str]) -> int | None:
             chosen = i
         if i == 0:
             imgui.pop_style_color()
+    if not takes_keys:
+        return chosen
     if imgui.is_key_pressed(imgui.Key.enter, False) or imgui.is_key_pressed(imgui.Key.keypad_enter, False):
         chosen = 0
     if imgui.is_key_pressed(imgui.Key.escape, False):

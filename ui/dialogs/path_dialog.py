@@ -22,7 +22,8 @@ _LINES = 12
 
 class PathDialog:
     """Asks for a file: by the system's own dialog where there is one, else by a path field with the files
-    of the folder below it. `kind` says which files fit; `name` is a file to propose."""
+    of the folder below it. `kind` says which files fit; `name` is a file to propose; `before` is a dialog
+    that is asked again afterwards, whatever was chosen."""
 
     def __init__(
         self,
@@ -32,8 +33,10 @@ class PathDialog:
         folder: Path,
         then: Callable[[Path], None],
         name: str = "",
+        before: Dialog | None = None,
     ) -> None:
         self.title, self.kind, self.is_saving, self.then = title, kind, is_saving, then
+        self._before = before
         self._folder = folder
         """Where a name without a folder belongs: the folder that the dialog began with."""
         self.text = f"{folder}/{name}".replace("//", "/")
@@ -47,7 +50,7 @@ class PathDialog:
         if not self._native.is_answered:
             return None
         path = self._native.path
-        return Answer() if path is None else Answer(lambda: self.then(path))
+        return self._left() if path is None else Answer(lambda: self._use(path), self._before)
 
     def _draw_field(self) -> Answer | None:
         if not modal.begin(self.title):
@@ -66,7 +69,14 @@ class PathDialog:
             return None
         # A path that is refused is asked for again; a notice says why.
         self._wants_focus = True
-        return Answer() if chosen == 1 else Answer(self._take, again=self)
+        return self._left() if chosen == 1 else Answer(self._take, again=self)
+
+    def _left(self) -> Answer:
+        return Answer(lambda: self._before)
+
+    def _use(self, path: Path) -> Dialog | None:
+        self.then(path)
+        return self._before
 
     def _take(self) -> Dialog | None:
         """Use the path that was typed, or ask whether a file that is there may be replaced. Raises
@@ -78,13 +88,12 @@ class PathDialog:
         if self.is_saving and not path.suffix and len(self.kind.suffixes) == 1:
             path = path.with_name(path.name + self.kind.suffixes[0])
         if not (self.is_saving and os.path.exists(path)):
-            self.then(path)
-            return None
+            return self._use(path)
         return Question(
             "Replace file",
             f"{path.name} is there already.",
             (
-                Choice("Replace", Answer(lambda: self.then(path), again=self)),
+                Choice("Replace", Answer(lambda: self._use(path), again=self)),
                 Choice("Cancel", Answer(lambda: self)),
             ),
         )

@@ -313,11 +313,14 @@ class Editor:
             self.renderer.request(Restart())
 
     def change_device(self, device: str | None) -> None:
-        """Render on another device from now on. The last picture stays until that one has one."""
+        """Render on another device from now on. The last picture stays until that one has one; a final render
+        under way is given up."""
         self.renderer.close()
+        if self.rendering.final is not None:
+            self.say(f"{self.rendering.final.path}: is given up with its device; render it again", "warning")
         self.control = replace(self.control, device=device)
         self.rendering = replace(
-            self.rendering, is_pinned=False, is_stale=False, waiting=(), has_failed=False
+            self.rendering, is_pinned=False, is_stale=False, waiting=(), final=None, has_failed=False
         )
         self.renderer = self._open_renderer(device)
         self.renderer.show(self.view)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from incpt.viewer.renderer import Building, Message, Problem, Request, Waiting
+from incpt.viewer.renderer import Building, FinalProgress, Finals, Message, Problem, Request, Waiting
 from incpt.viewer.view import Frame
 
 
@@ -24,6 +24,18 @@ class Tool:
 
 
 @dataclass(frozen=True)
+class FinalChoice:
+    """How pictures are rendered into files: samples per pixel, a limit in seconds (0: none), the format by
+    its suffix, whether it is denoised, and whether it gets auxiliary images."""
+
+    spp: int = 256
+    seconds: float = 0.0
+    suffix: str = ".png"
+    denoise: bool = False
+    aovs: bool = False
+
+
+@dataclass(frozen=True)
 class Control:
     """What is asked of the renderer, beside the scene, and is forgotten when the editor ends.
 
@@ -31,12 +43,14 @@ class Control:
     target_spp  samples of every pixel at which rendering rests; None: it never rests.
     point       where the picture was clicked last, in units of it from the top left; None: nowhere yet.
     device      the OpenCL device by name; None: the default.
+    final       what the last final render was asked for.
     """
 
     paused: bool = False
     target_spp: int | None = None
     point: tuple[float, float] | None = None
     device: str | None = None
+    final: FinalChoice = FinalChoice()
 
 
 @dataclass(frozen=True)
@@ -48,6 +62,7 @@ class Rendering:
     is_pinned   whether errors are measured against a pinned picture.
     is_stale    whether that picture is of another scene.
     waiting     the requests that wait for the whole picture.
+    final       how far the final render under way is; None: there is none.
     has_failed  whether the device does nothing more until it is opened again.
     """
 
@@ -56,6 +71,7 @@ class Rendering:
     is_pinned: bool = False
     is_stale: bool = False
     waiting: tuple[Request, ...] = ()
+    final: FinalProgress | None = None
     has_failed: bool = False
 
     def after(self, message: Message) -> Rendering:
@@ -71,11 +87,13 @@ class Rendering:
                 )
             case Waiting():
                 return replace(self, waiting=message.requests)
+            case Finals():
+                return replace(self, final=message.current)
             case Building():
                 return replace(self, building=message if message.done < message.total else None)
             case Problem():
-                waiting = () if message.fatal else self.waiting
-                return replace(self, has_failed=self.has_failed or message.fatal, waiting=waiting)
+                if message.fatal:
+                    return replace(self, has_failed=True, waiting=(), final=None)
         return self
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from imgui_bundle import imgui
@@ -11,10 +12,13 @@ from incpt.ui.editor.notices import Notice
 from incpt.ui.panels.render import MODE_TEXTS, found_text
 from incpt.ui.rect import Rect
 from incpt.ui.widgets import icons, places, theme, widgets
+from incpt.viewer.renderer import FinalProgress
 from incpt.viewer.view import Frame, Picture
 
 _COLORS = {"done": theme.QUIET, "warning": theme.WARNING, "error": theme.ERROR}
 """Colours of notices, by level."""
+_FINAL_LINES = 18.0
+"""Width of the bar of a final render, in heights of a line."""
 _JOB_LINES = 22.0
 """Width of the bar of what is read, in heights of a line."""
 _FLOATING = (
@@ -28,19 +32,51 @@ _FLOATING = (
 """Windows over the picture that a user cannot move."""
 
 
-def draw_status_bar(text: str) -> None:
-    """One line at the bottom of the window."""
+def draw_status_bar(text: str, final: FinalProgress | None = None) -> str | None:
+    """One line at the bottom of the window, with the final render under way at its right. Returns "keep"
+    where that shall be written as it is, "forget" where it is given up."""
     flags = (
         imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.menu_bar
     )
-    height = imgui.get_frame_height()
+    height, answer = imgui.get_frame_height(), None
     viewport = imgui.get_main_viewport()
     is_shown = imgui.internal.begin_viewport_side_bar("##status", viewport, imgui.Dir.down, height, flags)
     if is_shown and imgui.begin_menu_bar():
         imgui.text_unformatted(text)
         places.note("status")
+        answer = _draw_final(final) if final is not None else None
         imgui.end_menu_bar()
     imgui.end()
+    return answer
+
+
+def _draw_final(final: FinalProgress) -> str | None:
+    style, answer = imgui.get_style(), None
+    width = imgui.get_text_line_height() * _FINAL_LINES
+    labels = ("Write now", "Give up")
+    buttons = sum(imgui.calc_text_size(one).x + 2 * style.frame_padding.x for one in labels)
+    imgui.same_line(imgui.get_window_width() - width - buttons - 4 * style.item_spacing.x)
+    imgui.progress_bar(final.share, imgui.ImVec2(width, 0), final_text(final))
+    places.note("final")
+    imgui.set_item_tooltip(
+        f"{final.path}\n{final.spp:,} samples per pixel, {final.seconds:,.0f} s of rendering"
+    )
+    if imgui.small_button(labels[0]):
+        answer = "keep"
+    places.note("final: Write now")
+    if imgui.small_button(labels[1]):
+        answer = "forget"
+    places.note("final: Give up")
+    return answer
+
+
+def final_text(final: FinalProgress) -> str:
+    """The file, how far it is, how long it will take, and how many others wait."""
+    text = f"{final.path.name}: {math.floor(100 * final.share)} %"
+    if final.left is not None:
+        left = round(final.left)
+        text += f", {left // 60}:{left % 60:02d} left"
+    return text + (f", {final.waiting} more" if final.waiting else "")
 
 
 def status_text(
