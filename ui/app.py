@@ -97,7 +97,9 @@ class App:
             slot = textures.slot_at(dropped.x, dropped.y)
             editor.attempt(lambda path=dropped.path, slot=slot: files.drop(editor, path, slot))  # type: ignore[misc]
         if editor.frame is not None and editor.frame is not self.shown_frame:
-            self.display.upload(editor.frame.pictures, editor.frame.first_hits)
+            view = editor.frame.view
+            region = None if view.region is None else Rect(*view.region)
+            self.display.upload(editor.frame.pictures, editor.frame.first_hits, region, view.scene.camera)
             self.shown_frame = editor.frame
         window.begin_frame()
         self._area = take_frame(editor, self.workspace, self.viewport, self.display.overlay())

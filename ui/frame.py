@@ -26,6 +26,8 @@ def take_frame(
     editor.resize_viewport(pixels_in(area))
     if editor.gesture.is_cancelled:
         viewport.let_go()
+    if editor.region is not None:
+        captions.draw_region(picture, editor.region)
     outcome = viewport.update(
         editor.shown,
         editor.selection,
@@ -37,7 +39,8 @@ def take_frame(
     )
     _take_outcome(editor, outcome)
     _take_material(editor, picture)
-    captions.draw(editor.frame, overlay, editor.preferences.display, picture)
+    rendered = picture if editor.region is None else picture.part(editor.region)
+    captions.draw(editor.frame, overlay, editor.preferences.display, rendered)
     if not editor.has_light:
         captions.draw_darkness(picture)
     editor.settle(viewport.is_held or imgui.is_any_item_active(), viewport.is_flying, viewport.hint)
@@ -81,9 +84,11 @@ def _take_outcome(editor: Editor, outcome: Outcome) -> None:
             editor.look(one.scene.camera, one.label, one.key, one.rest_seconds)
     if outcome.selection != editor.selection:
         editor.select(outcome.selection)
+    if outcome.region is not None:
+        editor.show_region(outcome.region)
     editor.change_display(outcome.display)
     if isinstance(outcome.pick, PickBox):
-        editor.renderer.request(outcome.pick)
+        editor.pick_box(outcome.pick)
     elif outcome.pick is not None:
         editor.pick(outcome.pick, outcome.wants_menu)
     elif outcome.wants_menu:

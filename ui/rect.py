@@ -56,6 +56,11 @@ class Rect(Generic[_N_co]):
         x, y = self.relative(point)
         return 0 <= x < 1 and 0 <= y < 1
 
+    def part(self, share: Rect[float]) -> Rect[float]:
+        """The part of it that `share` is in units of it; the other way round than `relative`."""
+        left, top = self.left + share.left * self.width, self.top + share.top * self.height
+        return Rect(left, top, share.width * self.width, share.height * self.height)
+
     def scaled(self, factor: float) -> Rect[float]:
         """The same rectangle in another unit, `factor` of which make one of this: pixels from points, say."""
         return Rect(self.left * factor, self.top * factor, self.width * factor, self.height * factor)

@@ -167,6 +167,28 @@ def set_view(camera: Camera, side: str) -> Camera:
     return _with(camera, position, camera.target, up=(0.0, 1.0, 0.0))
 
 
+def cropped(camera: Camera, size: tuple[int, int], box: tuple[int, int, int, int]) -> Camera:
+    """The camera whose picture is a part of that of `camera`, which has `size` (width, height) pixels: those
+    of `box` (left, top, right, bottom). Lens and perspective stay. Raises InputError for a part without
+    pixels, and for one that is so small or so far aside that no shift reaches it."""
+    (width, height), (left, top, right, bottom) = size, box
+    if not (left < right and top < bottom):
+        raise InputError(f"box: {box} has no pixels; use left, top, right, bottom")
+    aspect, part_aspect = width / height, (right - left) / (bottom - top)
+    share = (bottom - top) / height
+    shift_x, shift_y = camera.shift_at(aspect)
+    x = (shift_x + (left + right) / width - 1) * width / (right - left)
+    y = (shift_y + 1 - (top + bottom) / height) / share
+    larger = max(part_aspect, 1.0)
+    aside = replace(camera, shift_x=x * part_aspect / (2 * larger), shift_y=y / (2 * larger))
+    if camera.is_orthographic:
+        return replace(aside, ortho_height=camera.ortho_height * share)
+    # Less of the same sensor behind the same lens.
+    length = camera.focal_length_at(aspect)
+    sensor = 2 * length * math.tan(math.radians(camera.fov_y_at(aspect)) / 2)
+    return replace(aside, focal_length=length, sensor_fit="vertical", sensor_height=sensor * share)
+
+
 def point_under(camera: Camera, cursor: tuple[float, float], size: tuple[float, float]) -> Vector:
     """The world point under the cursor at the target's distance, on the plane that faces the camera."""
     start, ray = _ray(camera, cursor, size)

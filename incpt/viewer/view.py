@@ -30,6 +30,8 @@ class View:
     split             also render under "restart", fed with the same edits.
     first_hits        whether first hits are wanted.
     denoise           whether a denoised picture is wanted, see `denoising.py`.
+    region            which part of a larger picture `scene` is for whoever shows it: left, top, width and
+                      height in units of that; it comes back as it is.
     """
 
     scene: Scene
@@ -43,6 +45,7 @@ class View:
     split: bool = False
     first_hits: bool = False
     denoise: bool = False
+    region: tuple[float, float, float, float] | None = None
 
     @property
     def needs_first_hits(self) -> bool:

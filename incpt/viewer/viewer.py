@@ -236,6 +236,7 @@ class Viewer:
                 scene=good.scene,
                 before=good.before,
                 resolution_scale=good.resolution_scale,
+                region=good.region,
                 split=len(self._seats) > 1,
             )
             self._state = replace(self._state, view=shown)
@@ -343,7 +344,11 @@ class Viewer:
         if not scheduler.shows(main, view):
             shown = main.view
             view = replace(
-                view, scene=shown.scene, before=shown.before, resolution_scale=shown.resolution_scale
+                view,
+                scene=shown.scene,
+                before=shown.before,
+                resolution_scale=shown.resolution_scale,
+                region=shown.region,
             )
         return Frame(
             view=view,

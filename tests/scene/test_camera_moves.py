@@ -13,6 +13,7 @@ from support.cameras import cameras, points, units
 
 from incpt.core import affine
 from incpt.core.affine import Vector
+from incpt.core.errors import InputError
 from incpt.scene import camera_moves
 from incpt.scene.camera import Camera
 from incpt.scene.camera_moves import MAX_ELEVATION_DEG, VIEWS
@@ -235,3 +236,33 @@ def test_no_move_leaves_what_a_scene_allows(x: float, z: float, drag: float, oth
     ]
     for result in moved:
         assert isinstance(result, Camera) and replace(result) == result
+
+
+CROPPED = (64, 40)
+fractions = st.tuples(st.floats(0, 1), st.floats(0, 1))
+boxes = st.tuples(
+    *[st.integers(0, side - 8) for side in CROPPED], *[st.integers(8, side) for side in CROPPED]
+)
+
+
+@pytest.mark.slow
+@settings(max_examples=100, deadline=None)
+@given(cameras(), boxes, st.lists(fractions, min_size=1, max_size=4), st.floats(0, 8))
+def test_a_cropped_camera_has_the_rays_and_the_lens_of_the_part(
+    camera: Camera, box: tuple[int, int, int, int], at: list[tuple[float, float]], f_stop: float
+) -> None:
+    camera, (width, height) = replace(camera, f_stop=f_stop), CROPPED
+    left, top = box[:2]
+    right, bottom = min(left + box[2], width), min(top + box[3], height)
+    part = camera_moves.cropped(camera, CROPPED, (left, top, right, bottom))
+    inside = np.array(at) * (right - left, bottom - top) + (left, top)
+    expected = camera.rays(inside / CROPPED, width / height)
+    aspect = (right - left) / (bottom - top)
+    for ray, wanted in zip(part.rays(np.array(at), aspect), expected, strict=True):
+        np.testing.assert_allclose(ray, wanted, rtol=1e-9, atol=1e-9)
+    assert part.lens_radius(aspect) == pytest.approx(camera.lens_radius(width / height))
+
+
+def test_a_crop_without_pixels_is_refused() -> None:
+    with pytest.raises(InputError, match="no pixels"):
+        camera_moves.cropped(Camera(), CROPPED, (8, 8, 8, 16))

@@ -25,3 +25,8 @@ def test_left_and_top_belong_to_it_right_and_bottom_do_not() -> None:
 
 def test_pixels_from_points() -> None:
     assert RECT.scaled(1.5) == Rect(15, 30, 60, 12)
+
+
+def test_a_part_is_the_inverse_of_relative() -> None:
+    part = RECT.part(Rect(0.25, 0.5, 0.5, 0.25))
+    assert part == Rect(20, 24, 20, 2) and RECT.relative((part.left, part.top)) == (0.25, 0.5)

@@ -22,9 +22,13 @@ def select_none(editor: Editor) -> None:
 
 
 def cancel(editor: Editor) -> None:
-    """Give up the drag under way; without one, deselect in the plain set, as other tools do."""
-    is_given_up = editor.cancel_drag()
-    if not is_given_up and editor.preferences.navigation == "plain":
+    """Give up the drag under way; without one, the region that alone is rendered; without that, deselect in
+    the plain set, as other tools do."""
+    if editor.cancel_drag():
+        return
+    if editor.region is not None:
+        editor.show_region(None)
+    elif editor.preferences.navigation == "plain":
         select_none(editor)
 
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import moderngl
 
 from incpt.render.first_hits import FirstHits
+from incpt.scene.camera import Camera
 from incpt.ui.display import shaders
 from incpt.ui.display.outline import Outline, Outlined
 from incpt.ui.display.overlays import Overlay
@@ -26,6 +27,10 @@ BAR_PX, GRIP_PX = 2.0, (10.0, 44.0)
 """Width of the split bar, and width and height of its grip, at a DPI scale of 1."""
 
 
+_BARE = DisplaySettings()
+"""What is around a region has no overlay and no lines."""
+
+
 class Display:
     """Shows pictures in an OpenGL 3.3 core context. All calls belong to the thread of that context."""
 
@@ -41,16 +46,33 @@ class Display:
         self._arrays = {p: context.vertex_array(p, []) for p in self._programs}
         self.outline = Outline(context)
         self._sides: list[PictureTextures] = []
+        self._region: Rect[float] | None = None
+        self._camera: Camera | None = None
+        self._around: PictureTextures | None = None
+        """The whole picture as it was, around the region that alone is rendered."""
         self._first_hits: FirstHits | None = None
         self.background = (0.11, 0.11, 0.115)
         """Colour of pixels that have no sample yet and nothing to show instead, sRGB."""
 
-    def upload(self, pictures: Sequence[Picture], first_hits: FirstHits | None = None) -> None:
-        """Take the pictures of a Frame; what is the same as before is not sent again.
+    def upload(
+        self,
+        pictures: Sequence[Picture],
+        first_hits: FirstHits | None = None,
+        region: Rect[float] | None = None,
+        camera: Camera | None = None,
+    ) -> None:
+        """Take the pictures of a Frame; what is the same as before is not sent again. They show a `region` of
+        the picture, in units of it, or all of it (None). Around a region the last whole one stays, until the
+        region is seen by another `camera`.
 
         When the size of a picture changes, the last complete one of the other size (the preview of a camera
         move, say) shows through where the new one has no sample yet, until it is complete.
         """
+        if region != self._region:
+            self._go_to(region)
+        elif camera != self._camera:
+            self._forget_around()
+        self._camera = camera
         while len(self._sides) < len(pictures):
             self._sides.append(PictureTextures(self._context))
         while len(self._sides) > len(pictures):
@@ -59,10 +81,27 @@ class Display:
             side.upload(picture)
         self._first_hits = first_hits
 
+    def _go_to(self, region: Rect[float] | None) -> None:
+        if self._around is None and self._region is None and self._sides:
+            self._around = self._sides.pop()
+            self._around.overlay = self._around.overlay_of = None
+        while self._sides:
+            self._sides.pop().release()
+        if region is None and self._around is not None:
+            self._around.begin_anew()
+            self._sides, self._around = [self._around], None
+        self._region = region
+
     def forget(self) -> None:
         """Drop the pictures: nothing of them may show through the next, of another scene."""
         self.upload(())
+        self._forget_around()
         self._first_hits = None
+
+    def _forget_around(self) -> None:
+        if self._around is not None:
+            self._around.release()
+            self._around = None
 
     def overlay(self, side: int = -1) -> Overlay | None:
         """The overlay of a side as it was drawn last, for its legend and numbers; see `overlays.Overlay`."""
@@ -80,20 +119,26 @@ class Display:
     ) -> None:
         """Draw into the framebuffer that is bound.
 
-        `rect_px` is where the image lies in the framebuffer; it may reach beyond it. `clip_px`, by default
-        the whole framebuffer, is where drawing is allowed. `scale` is the DPI scale, for lines. Leaves
-        viewport and blending as imgui's renderer, which sets its own, may have them; restores the bound
-        framebuffer.
+        `rect_px` is where the whole image lies in the framebuffer; it may reach beyond it. `clip_px`, by
+        default the whole framebuffer, is where drawing is allowed. `scale` is the DPI scale, for lines.
+        Leaves viewport and blending as imgui's renderer, which sets its own, may have them; restores the
+        bound framebuffer.
         """
         whole = Rect(0, 0, *framebuffer_size)
         area = whole_pixels(rect_px, clip_px or whole, whole)
         if not self._sides or area is None:
             return
+        rendered = rect_px if self._region is None else rect_px.part(self._region)
         context, target, height = self._context, self._context.fbo, framebuffer_size[1]
         context.enable_only(moderngl.NOTHING)
         is_split = settings.split and len(self._sides) == 2
         bar_x = split_x(rect_px, settings.split_position) if is_split else None
         shown = self._shown(area, bar_x)
+        if self._region is not None:
+            part = whole_pixels(rendered, area)
+            shown = [] if part is None else [(self._sides[-1], part)]
+        if self._around is not None:
+            self._map(self._around, settings)
         for side, _ in shown:
             self._map(side, settings)
             if settings.tile_grid:
@@ -101,10 +146,12 @@ class Display:
             side.lay_over(settings.overlay, self._first_hits)
         target.use()
         context.scissor = None
+        if self._around is not None:
+            self._draw_side(self._around, area, rect_px, _BARE, height)
         for side, part in shown:
-            self._draw_side(side, part, rect_px, settings, height)
+            self._draw_side(side, part, rendered, settings, height)
         if settings.outline and selection is not None:
-            self.outline.draw(target, area, rect_px, height, selection, self._sides[-1].aspect, scale)
+            self.outline.draw(target, area, rect_px, height, selection, self._aspect(selection), scale)
         if bar_x is not None:
             self._draw_bar(bar_x, area, rect_px, height, scale)
         context.enable_only(moderngl.NOTHING)
@@ -118,6 +165,12 @@ class Display:
             array.release()
         for program in self._programs:
             program.release()
+
+    def _aspect(self, selection: Outlined) -> float:
+        if self._region is None:
+            return self._sides[-1].aspect
+        width, height = selection.scene.settings.size
+        return width / height
 
     def _shown(self, area: Rect[int], bar_x: float | None) -> list[tuple[PictureTextures, Rect[int]]]:
         """Which side is seen in which part of the area."""

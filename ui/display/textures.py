@@ -58,6 +58,14 @@ class PictureTextures:
             self.underlay.release()
             self.underlay = None
 
+    def begin_anew(self) -> None:
+        """The next picture has nothing of this one, which shows through until that is complete."""
+        if self.picture is None or self.radiance is None or not _is_complete(self.picture):
+            return
+        if self.underlay is not None:
+            self.underlay.release()
+        self.underlay, self.radiance = self.radiance, None
+
     def _resize(self, width: int, height: int, old: Picture | None) -> None:
         if self.radiance is not None:
             if old is not None and _is_complete(old):

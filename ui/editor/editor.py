@@ -29,13 +29,15 @@ from incpt.ui.editor.document import Document
 from incpt.ui.editor.job import Job
 from incpt.ui.editor.notices import Notices
 from incpt.ui.editor.state import Beginning, Control, Gesture, Rendering, Screen, Tool
-from incpt.ui.editor.viewing import ShownScenes, Viewing
+from incpt.ui.editor.viewing import ShownScenes, Viewing, region_of
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
+from incpt.ui.rect import Point, Rect
 from incpt.viewer.renderer import (
     CopiedPicture,
     Exported,
     Message,
     Pick,
+    PickBox,
     Picked,
     PickedBox,
     Problem,
@@ -224,15 +226,43 @@ class Editor:
 
     def pick(self, pick: Pick, wants_menu: bool = False) -> None:
         """Ask which object is at a point of the picture, to select it, or where `wants_menu` and it is
-        selected, to open its menu; an edit to come starts there."""
-        self.control = replace(self.control, point=pick.point)
-        self.screen = replace(self.screen, menu_point=pick.point if wants_menu else None)
-        self.renderer.request(pick)
+        selected, to open its menu; an edit to come starts there. What lies beside a region is not seen."""
+        point = self._in_region(pick.point)
+        if not Rect(0.0, 0.0, 1.0, 1.0).contains(point):
+            return
+        self.control = replace(self.control, point=point)
+        self.screen = replace(self.screen, menu_point=point if wants_menu else None)
+        self.renderer.request(replace(pick, point=point))
+
+    def pick_box(self, box: PickBox) -> None:
+        """Ask which objects are seen in a box of the picture, to select them."""
+        low, high = self._in_region(box.low), self._in_region(box.high)
+        self.renderer.request(replace(box, low=low, high=high))
 
     def drop_material(self, material: str, point: tuple[float, float]) -> None:
         """Give a material to the object that is at a point of the picture."""
+        point = self._in_region(point)
         self.screen = replace(self.screen, dropped=(material, point))
         self.renderer.request(Pick(point))
+
+    def show_region(self, box: Rect[float] | None) -> None:
+        """Render a region of the picture alone from now on, given in units of it; None: all of it."""
+        region = None if box is None else region_of(box, self.scene.settings.size)
+        if box is not None and region is None:
+            self.say("The region is too small; draw it larger", "warning")
+            return
+        self.control = replace(self.control, point=None)
+        self.viewing = replace(self.viewing, region=region)
+
+    @property
+    def region(self) -> Rect[float] | None:
+        """The part of the picture that alone is rendered, in units of it; None: all of it is. A split view
+        shows all of it."""
+        return None if self.preferences.display.split else self.viewing.region
+
+    def _in_region(self, point: Point) -> Point:
+        """A point of the picture in units of what is rendered of it."""
+        return point if self.region is None else self.region.relative(point)
 
     def open_menu(self, name: str) -> None:
         """Open a menu at the mouse in the next frame."""
@@ -262,10 +292,10 @@ class Editor:
     @property
     def view(self) -> View:
         """What the renderer is to show."""
-        display = self.preferences.display
+        display, region, before = self.preferences.display, self.region, self._shown_before
         return View(
-            scene=self.shown,
-            before=self._shown_before,
+            scene=self._shown.region(self.shown, region),
+            before=None if before is None else self._shown.region(before, region),
             point=self.control.point,
             resolution_scale=self.preferences.resolution_scale,
             paused=self.control.paused,
@@ -275,6 +305,7 @@ class Editor:
             split=display.split,
             first_hits=display.overlay in NEEDS_FIRST_HITS,
             denoise=display.denoise and denoise.is_available(),
+            region=None if region is None else (region.left, region.top, region.width, region.height),
         )
 
     @property

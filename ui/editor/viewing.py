@@ -3,18 +3,27 @@
 A free view is no part of the scene: moving it is no edit, and saving does not keep it. What is shown is a
 scene all the same, the edited one with the view's camera in place of the active one, so that the renderer,
 handles and marks need to know of one camera only.
+
+Of a region of the picture the renderer is shown a scene too, whose camera sees that part alone.
 """
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 from dataclasses import dataclass, replace
 
+from incpt.scene import camera_moves
 from incpt.scene.camera import Camera
 from incpt.scene.model import Scene
+from incpt.ui.rect import Rect
 
 _MOST_KNOWN = 8
 """How many shown scenes are kept: the one before a drag, and those of the frames around the present one."""
+LEAST_REGION = 16
+"""The least width and height of a region, pixels."""
+_LEAST_SHARE = 1 / 64
+"""The least width and height of a region, as a share of the picture's."""
 
 
 @dataclass(frozen=True)
@@ -22,11 +31,13 @@ class Viewing:
     """camera      that of a free view; None: the scene is seen through its active camera.
     left        the free view that was left last, to which `switched` goes back.
     is_locked   whether moves of the view through the active camera move that camera, which are edits then.
+    region      the part of the picture that alone is rendered, in units of it; None: all of it is.
     """
 
     camera: Camera | None = None
     left: Camera | None = None
     is_locked: bool = False
+    region: Rect[float] | None = None
 
     @property
     def is_free(self) -> bool:
@@ -51,6 +62,7 @@ class ShownScenes:
 
     def __init__(self) -> None:
         self._known: OrderedDict[tuple[int, int], tuple[Scene, Camera, Scene]] = OrderedDict()
+        self._cropped: OrderedDict[tuple[int, Rect[float]], tuple[Scene, Scene]] = OrderedDict()
 
     def of(self, scene: Scene, camera: Camera | None) -> Scene:
         """`scene` as it is shown by a view's camera, or through its own (None)."""
@@ -61,6 +73,18 @@ class ShownScenes:
             self._keep(scene, camera, replace(scene, camera=camera))
         self._known.move_to_end(key)
         return self._known[key][2]
+
+    def region(self, shown: Scene, region: Rect[float] | None) -> Scene:
+        """What the renderer is to show of a shown scene: a region of its picture, or all of it (None)."""
+        if region is None:
+            return shown
+        key = id(shown), region
+        if key not in self._cropped:
+            self._cropped[key] = shown, _cropped(shown, region)
+        self._cropped.move_to_end(key)
+        while len(self._cropped) > _MOST_KNOWN:
+            self._cropped.popitem(last=False)
+        return self._cropped[key][1]
 
     def edited(self, shown: Scene, camera: Camera | None, own: Camera) -> Scene:
         """The edited scene of one that was made from a shown scene: with `own`, its own active camera, in
@@ -79,3 +103,32 @@ class ShownScenes:
         self._known[id(scene), id(camera)] = (scene, camera, shown)
         while len(self._known) > _MOST_KNOWN:
             self._known.popitem(last=False)
+
+
+def region_of(box: Rect[float], size: tuple[int, int]) -> Rect[float] | None:
+    """The whole pixels of a picture of `size` that a box in units of it touches, in the same units; None
+    where they are too few to be a region."""
+    left, top, right, bottom = _pixels(box, size)
+    least = [max(LEAST_REGION, side * _LEAST_SHARE) for side in size]
+    if right - left < least[0] or bottom - top < least[1]:
+        return None
+    width, height = size
+    return Rect(left / width, top / height, (right - left) / width, (bottom - top) / height)
+
+
+def _cropped(scene: Scene, region: Rect[float]) -> Scene:
+    size = scene.settings.size
+    box = left, top, right, bottom = _pixels(region, size)
+    settings = replace(scene.settings, size=(right - left, bottom - top))
+    return replace(scene, camera=camera_moves.cropped(scene.camera, size, box), settings=settings)
+
+
+def _pixels(box: Rect[float], size: tuple[int, int]) -> tuple[int, int, int, int]:
+    """Left, top, right and bottom of the pixels that a box touches, one at least. A billionth of a pixel is
+    none, which rounding makes of whole ones."""
+    ends = []
+    for low, length, side in ((box.left, box.width, size[0]), (box.top, box.height, size[1])):
+        start = min(max(math.floor(low * side + 1e-9), 0), side - 1)
+        ends.append((start, min(max(math.ceil((low + length) * side - 1e-9), start + 1), side)))
+    (left, right), (top, bottom) = ends
+    return left, top, right, bottom

@@ -82,11 +82,14 @@ def final_text(final: FinalProgress) -> str:
 def status_text(
     frame: Frame | None, is_paused: bool, selection: Selection, is_free_view: bool = False
 ) -> str:
-    """Whether the view is a free one, mode or how much of an edit is found, samples, selection: what one
-    looks for without opening a panel."""
+    """Whether the view is a free one, the region that alone is rendered, mode or how much of an edit is
+    found, samples, selection: what one looks for without opening a panel."""
     parts = ["Free view"] if is_free_view else []
     if frame is not None:
         picture = frame.pictures[-1]
+        if frame.view.region is not None:
+            width, height = frame.view.size
+            parts.append(f"Region of {width} × {height} pixels, Esc clears it")
         found = found_text(picture)
         if is_paused or found is None:
             parts.append("Paused" if is_paused else MODE_TEXTS[picture.mode])

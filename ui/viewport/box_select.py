@@ -1,4 +1,4 @@
-"""A box drawn by the mouse, in which things are selected."""
+"""A box drawn by the mouse: things in it are selected, or it is the region that is rendered."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from incpt.ui.viewport.modal_input import is_given_up, mouse
 from incpt.ui.widgets import theme
 
 HINT = "Drag: select what the box shows   |   Shift: add   |   Ctrl: take out   |   Esc, right click: give up"
-"""What keys and mouse do meanwhile, for the status line."""
+"""What keys and mouse do while things are selected, for the status line."""
+REGION_HINT = "Drag: render this part of the picture alone   |   Esc, right click: give up"
+"""What they do while a region is drawn."""
 _LEFT = imgui.MouseButton_.left
 
 
@@ -26,16 +28,17 @@ class Box:
 
 
 class BoxSelect:
-    """Waits for a press, then for the release. `is_on` tells whether it does."""
+    """Waits for a press, then for the release. `is_on` tells whether it does, `is_region` whether the box is
+    that of a region."""
 
     def __init__(self) -> None:
-        self.is_on = False
+        self.is_on = self.is_region = False
         self._start: Point | None = None
         self._last: Point = (0.0, 0.0)
 
-    def begin(self) -> None:
+    def begin(self, is_region: bool = False) -> None:
         """Wait for a press."""
-        self.is_on, self._start = True, None
+        self.is_on, self.is_region, self._start = True, is_region, None
 
     def stop(self) -> None:
         """Give it up."""

@@ -13,6 +13,8 @@ from incpt.viewer.view import Frame, Picture
 
 _NUMBERS_MARGIN = 4.0
 """How much wider than its number a tile has to be on the screen for numbers to be written, in points."""
+_BESIDE = (0.0, 0.0, 0.0, 0.65)
+"""What the picture is darkened by beside a region, sRGB with alpha."""
 _DARKNESS = "Nothing shines in this scene: add a light, or an environment in the Scene panel"
 
 
@@ -27,6 +29,23 @@ def draw(frame: Frame | None, overlay: Overlay | None, settings: DisplaySettings
         _write_legend(canvas, overlay, area)
     if settings.split and len(frame.pictures) == 2:
         _write_sides(canvas, frame, settings.split_position, area)
+
+
+def draw_region(picture: Rect[float], region: Rect[float]) -> None:
+    """Darken the picture, which lies at `picture` in points, around the region that alone is rendered, and
+    draw a line around that; it is given in units of the picture."""
+    canvas, part = imgui.get_background_draw_list(), picture.part(region)
+    shade = imgui.get_color_u32(imgui.ImVec4(*_BESIDE))
+    for left, top, right, bottom in (
+        (picture.left, picture.top, picture.right, part.top),
+        (picture.left, part.bottom, picture.right, picture.bottom),
+        (picture.left, part.top, part.left, part.bottom),
+        (part.right, part.top, picture.right, part.bottom),
+    ):
+        canvas.add_rect_filled((left, top), (right, bottom), shade)
+    line = imgui.get_color_u32(imgui.ImVec4(*theme.ACCENT))
+    canvas.add_rect((part.left, part.top), (part.right, part.bottom), line)
+    places.note_rect("region", part)
 
 
 def draw_darkness(area: Rect[float]) -> None:

@@ -53,6 +53,7 @@ class Outcome:
     scene, selection, display   the three after this frame.
     proposals                   the edits that led to `scene`, one after the other.
     pick                        a click or a box on the picture, to be asked of the renderer.
+    region                      a box that was drawn as the region to be rendered, in units of the picture.
     wants_menu                  the click asks for the menu of what is selected, if it is on that.
     """
 
@@ -61,6 +62,7 @@ class Outcome:
     display: DisplaySettings
     proposals: tuple[Proposal, ...] = ()
     pick: Pick | PickBox | None = None
+    region: Rect[float] | None = None
     wants_menu: bool = False
 
     def proposed(self, proposal: Proposal) -> Outcome:
@@ -151,7 +153,7 @@ class Viewport:
     def hint(self) -> str:
         """What the keys do while something in the picture takes them, one line; empty: they are commands."""
         if self._box.is_on:
-            return box_select.HINT
+            return box_select.REGION_HINT if self._box.is_region else box_select.HINT
         return modal_marks.HINT if self._transform.is_on else ""
 
     def let_go(self) -> None:
@@ -174,8 +176,8 @@ class Viewport:
     ) -> None:
         self.let_go()
         self.gizmo.is_over = False
-        if beginning.action == "box":
-            self._box.begin()
+        if beginning.action in ("box", "region"):
+            self._box.begin(is_region=beginning.action == "region")
             return
         names = outcome.selection.names
         self._transform.begin(beginning, outcome.scene, names, snap, picture, tool.pivot)
@@ -194,10 +196,12 @@ class Viewport:
         box = self._box.update(is_blocked=self._is_blocked)
         if box is None:
             return outcome
-        selection = outcome.selection if box.is_added or box.takes_out else Selection()
-        lights = light_marks.lights_in(outcome.scene, box.rect, picture) if outcome.display.outline else ()
         low = picture.relative((box.rect.left, box.rect.top))
         high = picture.relative((box.rect.right, box.rect.bottom))
+        if self._box.is_region:
+            return replace(outcome, region=Rect(*low, high[0] - low[0], high[1] - low[1]))
+        selection = outcome.selection if box.is_added or box.takes_out else Selection()
+        lights = light_marks.lights_in(outcome.scene, box.rect, picture) if outcome.display.outline else ()
         pick = PickBox(low, high, box.takes_out)
         return replace(outcome, selection=selection.boxed(lights, box.takes_out), pick=pick)
 

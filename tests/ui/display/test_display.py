@@ -18,6 +18,7 @@ from incpt.picture.tone_mapping import CURVES, tone_map
 from incpt.render import tiles
 from incpt.render.first_hits import FirstHits
 from incpt.render.modes import Mode
+from incpt.scene.camera import Camera
 from incpt.scene.model import Scene
 from incpt.ui.display import overlays
 from incpt.ui.preferences import DisplaySettings
@@ -482,3 +483,41 @@ def test_everything_is_given_back(context: Any) -> None:
     finally:
         context.objects.clear()
         context.gc_mode = None
+
+
+def test_a_region_lies_in_the_last_whole_picture(screen: Any) -> None:
+    whole, part, later = noise(20, 10), noise(10, 4)[:, ::-1], noise(20, 10)[::-1]
+    region, camera = Rect(0.25, 0.2, 0.5, 0.4), Camera()
+    window = screen(80, 40)
+    window.display.upload([picture(whole)], None, None, camera)
+    window.display.upload([picture(part)], None, region, camera)
+    expected = mapped(whole).repeat(4, axis=0).repeat(4, axis=1)
+    expected[8:24, 20:60] = mapped(part).repeat(4, axis=0).repeat(4, axis=1)
+    assert_same(window.draw(Rect(0, 0, 80, 40)), expected)
+    other = Rect(0.5, 0.2, 0.5, 0.4)
+    window.display.upload([picture(part)], None, other, camera)
+    shown = window.draw(Rect(0, 0, 80, 40))
+    assert_same(shown[:, :40], mapped(whole).repeat(4, axis=0).repeat(4, axis=1)[:, :40])
+    # Seen by another camera nothing is known of what lies around it.
+    window.display.upload([picture(part)], None, other, Camera(fov_y=12))
+    shown = window.draw(Rect(0, 0, 80, 40))
+    assert (shown[:, :40] == CLEAR).all() and not (shown[8:24, 40:] == CLEAR).all()
+    window.display.upload([picture(later)])
+    assert_same(window.draw(Rect(0, 0, 80, 40)), mapped(later).repeat(4, axis=0).repeat(4, axis=1))
+
+
+def test_the_whole_picture_shows_through_after_a_region(screen: Any) -> None:
+    whole, part = noise(20, 10), noise(10, 4)
+    window = screen(80, 40)
+    window.display.upload([picture(whole)])
+    window.display.upload([picture(part)], None, Rect(0.25, 0.2, 0.5, 0.4))
+    rows = np.zeros((10, 20), np.float32)
+    rows[:5] = 1
+    window.display.upload([picture(whole * 0.5, alpha=rows)])
+    expected = (
+        np.concatenate([mapped(whole * 0.5)[:5], mapped(whole)[5:]]).repeat(4, axis=0).repeat(4, axis=1)
+    )
+    # The old one is smooth where it is magnified.
+    shown = window.draw(Rect(0, 0, 80, 40))
+    assert_same(shown[:20], expected[:20])
+    assert np.abs(shown[20:].astype(int) - expected[20:]).max() < 128
