@@ -104,6 +104,7 @@ class App:
         window.begin_frame()
         self._area = take_frame(editor, self.workspace, self.viewport, self.display.overlay())
         window.set_title(editor.title)
+        window.show_full_screen(editor.screen.is_full_screen)
         window.end_frame(self._draw_below, is_swapped)
         self._keep_preferences()
 
@@ -122,7 +123,9 @@ class App:
         width, height = self.window.framebuffer_size
         # It draws a frame of its own, because what the back buffer holds is undefined after a swap.
         self.frame(is_swapped=False)
-        flat = np.frombuffer(self.window.context.screen.read(components=3, alignment=1), np.uint8)
+        # moderngl takes the screen for as large as it was at first.
+        read = self.window.context.screen.read((0, 0, width, height), components=3, alignment=1)
+        flat = np.frombuffer(read, np.uint8)
         return flat.reshape(height, width, 3)[::-1]
 
     def _open_renderer(self, device: str | None) -> ThreadedRenderer:

@@ -25,6 +25,8 @@ CONFIG_DIR = "INCPT_CONFIG_DIR"
 MAX_RECENT = 10
 """How many recent files are remembered."""
 
+PANELS = ("Outliner", "Object", "Materials", "Scene", "Render", "Method")
+"""The panels beside the picture."""
 CURVES = ("agx", "filmic", "srgb")
 """Curves of tone mapping, by name."""
 OVERLAYS = (
@@ -76,6 +78,8 @@ def _checked(name: str, value: Any, default: Any) -> Any:
         return value
     if name == "recent":
         return _recent(value)
+    if name == "hidden_panels":
+        return _panels(value)
     if name == "window_size":
         if not isinstance(value, (list, tuple)) or len(value) != 2:
             raise InputError(f"{name}: {value!r} is not a pair of width and height")
@@ -102,6 +106,12 @@ def _recent(value: Any) -> tuple[str, ...]:
     if not isinstance(value, (list, tuple)) or not all(isinstance(path, str) for path in value):
         raise InputError("recent: is not a list of paths")
     return tuple(dict.fromkeys(value))[:MAX_RECENT]
+
+
+def _panels(value: Any) -> tuple[str, ...]:
+    if not isinstance(value, (list, tuple)) or not all(name in PANELS for name in value):
+        raise InputError(f"hidden_panels: is not a list of some of {', '.join(PANELS)}")
+    return tuple(name for name in PANELS if name in value)
 
 
 @dataclass(frozen=True)
@@ -147,6 +157,7 @@ class Preferences(_Group):
     resolution_scale  rendered size over the scene's own.
     autosave_seconds  between two writes of the recovery file.
     fly_speed         metres per second.
+    hidden_panels     those of PANELS that are not shown.
     """
 
     display: DisplaySettings = DisplaySettings()
@@ -160,6 +171,7 @@ class Preferences(_Group):
     resolution_scale: float = 1.0
     autosave_seconds: float = 30.0
     fly_speed: float = 2.0
+    hidden_panels: tuple[str, ...] = ()
 
     def with_recent(self, path: str | os.PathLike[str]) -> Preferences:
         """Preferences in which `path` was opened last."""

@@ -59,6 +59,8 @@ class Window:
         self._frames_due = _SETTLING_FRAMES
         self._tooltip_at = math.inf
         self._fixed_scale = scale
+        self._place_before: tuple[int, int, int, int] | None = None
+        """Where the window was before it took the whole screen: left, top, width, height."""
         self._listen()
         self._start_imgui(layout_file)
 
@@ -102,6 +104,8 @@ class Window:
     @property
     def size(self) -> tuple[int, int]:
         """Width and height as the system counts them: what to open the next window with."""
+        if self._place_before is not None:
+            return self._place_before[2:]
         width, height = glfw.get_window_size(self.handle)
         return width, height
 
@@ -109,6 +113,23 @@ class Window:
     def framebuffer_size(self) -> tuple[int, int]:
         width, height = glfw.get_framebuffer_size(self.handle)
         return width, height
+
+    def show_full_screen(self, on: bool) -> None:
+        """Take the whole of the screen on which the window is, or go back to where it was."""
+        if on == (self._place_before is not None):
+            return
+        if on:
+            at, size = glfw.get_window_pos(self.handle), glfw.get_window_size(self.handle)
+            screen = _screen_at(at[0] + size[0] // 2, at[1] + size[1] // 2)
+            mode = glfw.get_video_mode(screen)
+            glfw.set_window_monitor(self.handle, screen, 0, 0, *mode.size, mode.refresh_rate)
+            self._place_before = (*at, *size)
+        elif self._place_before is not None:
+            # The stubs of glfw have no NULL there, which the C signature takes.
+            no_screen: Any = None
+            glfw.set_window_monitor(self.handle, no_screen, *self._place_before, glfw.DONT_CARE)
+            self._place_before = None
+        self.redraw()
 
     def redraw(self) -> None:
         """Draw the next few frames, whatever happens."""
@@ -178,7 +199,7 @@ class Window:
         # On macOS the system's screen coordinates are points already; elsewhere the content scale tells how
         # many pixels a point has.
         content = glfw.get_window_content_scale(self.handle)[0]
-        points = self.framebuffer_size[0] / max(self.size[0], 1)
+        points = self.framebuffer_size[0] / max(glfw.get_window_size(self.handle)[0], 1)
         scale = self._fixed_scale or content / max(points, 1.0)
         if scale != self._scale:
             self._scale = scale
@@ -205,6 +226,15 @@ def _init_glfw() -> None:
         raise DeviceError(
             f"no window can be opened ({reason}); the editor needs a display, rendering does not"
         )
+
+
+def _screen_at(x: int, y: int) -> Any:
+    """The monitor on which a point of the desktop is; the first one where it is on none."""
+    for screen in glfw.get_monitors():
+        (left, top), mode = glfw.get_monitor_pos(screen), glfw.get_video_mode(screen)
+        if 0 <= x - left < mode.size.width and 0 <= y - top < mode.size.height:
+            return screen
+    return glfw.get_primary_monitor()
 
 
 def _text(message: Any) -> str:

@@ -28,6 +28,7 @@ from incpt.ui.panels import notices, outliner, plots, render, tool, transform
 from incpt.ui.panels import textures as textures_panel
 from incpt.ui.panels.materials import MaterialsState
 from incpt.ui.panels.outliner import OutlinerState
+from incpt.ui.preferences import PANELS
 from incpt.ui.rect import Rect
 from incpt.ui.widgets import focus, mixed, places, widgets
 from incpt.ui.widgets.refusals import Refusals
@@ -49,10 +50,20 @@ class Workspace:
         the picture, in points."""
         places.begin_frame()
         focus.begin_frame()
-        from_bar, from_popup = menus.draw_menu_bar(editor), menus.draw_popups(editor)
-        chosen = from_bar or from_popup
+        is_alone = editor.screen.is_alone
+        chosen = (None if is_alone else menus.draw_menu_bar(editor)) or menus.draw_popups(editor)
         if chosen is not None:
             editor.attempt(lambda: chosen(editor))
+        area = self._layout.keep() if is_alone else self._draw_around(editor)
+        _draw_notices(editor, area)
+        _draw_dialog(editor)
+        pressed = menus.pressed_command(editor)
+        if pressed is not None:
+            command.run(editor, pressed)
+        return area
+
+    def _draw_around(self, editor: Editor) -> Rect[float]:
+        """The status bar and the panels; returns what they leave for the picture."""
         status = notices.status_text(
             editor.frame, editor.control.paused, editor.selection, editor.viewing.is_free
         )
@@ -63,18 +74,18 @@ class Workspace:
         editor.screen = replace(editor.screen, wants_first_layout=False)
         if editor.screen.is_renaming:
             imgui.set_window_focus("Outliner")
-        self._window("Outliner", editor, self._draw_outliner)
-        self._window("Object", editor, self._draw_object)
-        self._window("Materials", editor, self._draw_materials)
-        self._window("Scene", editor, self._draw_scene)
-        self._window("Render", editor, self._draw_render)
-        self._window("Method", editor, self._draw_method)
-        self._layout.show_first_tab()
-        _draw_notices(editor, area)
-        _draw_dialog(editor)
-        pressed = menus.pressed_command(editor)
-        if pressed is not None:
-            command.run(editor, pressed)
+        drawn: dict[str, Callable[[Editor], None]] = {
+            "Outliner": self._draw_outliner,
+            "Object": self._draw_object,
+            "Materials": self._draw_materials,
+            "Scene": self._draw_scene,
+            "Render": self._draw_render,
+            "Method": self._draw_method,
+        }
+        for name in PANELS:
+            if name not in editor.preferences.hidden_panels:
+                self._window(name, editor, drawn[name])
+        self._layout.show_tabs()
         return area
 
     def _window(self, name: str, editor: Editor, draw: Callable[[Editor], None]) -> None:
@@ -83,6 +94,7 @@ class Workspace:
         if beside is not None:
             imgui.set_next_window_dock_id(beside.dock_id, imgui.Cond_.first_use_ever)
         if imgui.begin(name, None, imgui.WindowFlags_.no_collapse)[0]:
+            self._layout.note_front(name)
             draw(editor)
         imgui.end()
 

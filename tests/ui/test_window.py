@@ -447,3 +447,38 @@ def test_no_display_is_one_line_and_status_1(file: Path, tmp_path: Path) -> None
     assert result.returncode == 1
     (line,) = result.stderr.splitlines()
     assert "display" in line
+
+
+# ------------------------------------------------------------------- beside the picture, and a part of it
+
+
+def test_a_final_render_goes_on_while_a_region_is_edited_and_the_screen_is_filled(
+    hand: Hand, tmp_path: Path
+) -> None:
+    editor = hand.app.editor
+    hand.key("F12")
+    hand.type_into("File", str(tmp_path / "final.exr"))
+    hand.type_into("Width", "112")
+    hand.type_into("Samples", "40")
+    hand.click("Render")
+    opened = editor.scene
+    hand.key("ctrl+b")
+    hand.drag(hand.in_picture(0.25, 0.25), hand.in_picture(0.75, 0.75))
+    hand.pump(lambda: editor.frame.view.region is not None, timeout=30)
+    pick(hand, "red cube")
+    hand.type_into("Position X", "0.35")
+    settled_region = editor.view.scene
+    hand.pump(lambda: editor.frame.view.scene == settled_region, timeout=30)
+    hand.pump(lambda: (tmp_path / "final.exr").exists() and editor.rendering.final is None, timeout=120)
+    session = Session(opened, size=(112, 72))
+    session.render(40)
+    assert np.array_equal(read_exr(tmp_path / "final.exr")["RGB"], session.image())
+    hand.key("F11")
+    hand.pump(frames=6)
+    assert hand.app.window.framebuffer_size == window.DISPLAY_SIZE
+    assert hand.app.window.size == window.WINDOW_SIZE, "the next window is no full screen"
+    keep(hand, "region-alone")
+    hand.key("Escape")
+    hand.pump(lambda: hand.app.window.framebuffer_size == window.WINDOW_SIZE, timeout=20)
+    hand.key("Escape")
+    hand.pump(lambda: editor.frame.view.region is None, timeout=30)

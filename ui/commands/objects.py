@@ -7,6 +7,7 @@ from dataclasses import replace
 from incpt.scene import edits
 from incpt.scene.selection import Selection
 from incpt.scene.transform import IDENTITY
+from incpt.ui.commands.window import show_panels, switch_panel
 from incpt.ui.editor.editor import Editor
 from incpt.ui.editor.state import TRANSFORM_KEY
 
@@ -22,9 +23,12 @@ def select_none(editor: Editor) -> None:
 
 
 def cancel(editor: Editor) -> None:
-    """Give up the drag under way; without one, the region that alone is rendered; without that, deselect in
-    the plain set, as other tools do."""
+    """Give up the drag under way; without one, go back from the picture alone, or else from the region that
+    alone is rendered; without any of these, deselect in the plain set, as other tools do."""
     if editor.cancel_drag():
+        return
+    if editor.screen.is_alone:
+        show_panels(editor)
         return
     if editor.region is not None:
         editor.show_region(None)
@@ -75,6 +79,9 @@ def delete(editor: Editor) -> None:
 
 def rename(editor: Editor) -> None:
     """Have another name of the active object typed, in its row of the outliner."""
+    show_panels(editor)
+    if "Outliner" in editor.preferences.hidden_panels:
+        switch_panel(editor, "Outliner")
     editor.screen = replace(editor.screen, is_renaming=True)
 
 

@@ -13,13 +13,14 @@ from typing import Any
 from incpt.picture import denoise
 from incpt.scene.edits import LIGHT_NAMES
 from incpt.scene.shapes import SHAPES
-from incpt.ui.commands import camera, files, materials, objects, pictures, rendering
+from incpt.ui.commands import camera, files, materials, objects, pictures, rendering, window
 from incpt.ui.commands.command import Action, Command, Test
 from incpt.ui.dialogs.about import About
 from incpt.ui.dialogs.help_page import HelpPage
 from incpt.ui.editor.editor import Editor
 from incpt.ui.panels.display import OVERLAY_TEXTS
 from incpt.ui.panels.tool import PIVOTS
+from incpt.ui.preferences import PANELS
 
 MENUS = ("File", "Edit", "Object", "View", "Render", "Help")
 """The menus of the bar, from left to right."""
@@ -122,8 +123,12 @@ def _switch_snap(editor: Editor) -> None:
     editor.change_snap(replace(snap, enabled=not snap.enabled))
 
 
-def _reset_layout(editor: Editor) -> None:
-    editor.screen = replace(editor.screen, wants_first_layout=True)
+def _switch_panel(name: str) -> Action:
+    return lambda editor: window.switch_panel(editor, name)
+
+
+def _shows_panel(name: str) -> Test:
+    return lambda editor: name not in editor.preferences.hidden_panels
 
 
 def _show_help(editor: Editor) -> None:
@@ -163,7 +168,8 @@ COMMANDS: tuple[Command, ...] = (
     Command("Box select", "Edit", _begin("box", "Box select"), "B", enabled=_has_objects, group=1,
             help="Select what is seen in a box that the mouse draws; Shift: add it, Ctrl: take it out"),
     Command("Cancel", "Edit", objects.cancel, "Escape", group=1,
-            help="Give up a drag; without one, the region; in the plain set, without that: deselect"),
+            help="Give up a drag; else go back from the picture alone, or from a region; else, in the plain "
+                 "set, deselect"),
     Command("Copy", "Edit", objects.copy, "Ctrl+C", enabled=_selected, group=2,
             help="Remember the selected objects and lights, with their materials"),
     Command("Paste", "Edit", objects.paste, "Ctrl+V", enabled=lambda e: bool(e.copied), group=2,
@@ -258,7 +264,13 @@ COMMANDS: tuple[Command, ...] = (
             enabled=lambda e: e.region is not None, help="Render all of the picture again"),
     Command("Match window", "View", rendering.match_window, group=2,
             help="Render as many pixels as the viewport has"),
-    Command("Reset layout", "View", _reset_layout, group=2, help="Panels as at the first start"),
+    *(Command(name, "View/Panels", _switch_panel(name), checked=_shows_panel(name), group=3)
+      for name in PANELS),
+    Command("Reset layout", "View", window.reset_layout, group=3, help="Panels as at the first start"),
+    Command("Picture alone", "View", window.switch_alone, "Ctrl+Space", group=3,
+            checked=lambda e: e.screen.is_alone, help="The picture has the whole window, without panels"),
+    Command("Full-screen picture", "View", window.switch_full_screen, "F11", group=3,
+            checked=lambda e: e.screen.is_full_screen, help="The picture has the whole screen"),
     Command("Render picture…", "Render", pictures.render_picture, "F12",
             help="Render the scene into a file, of any size, while editing goes on"),
     Command("Pause", "Render", rendering.switch_pause, "F5", group=1, checked=lambda e: e.control.paused,

@@ -133,17 +133,8 @@ class Display:
         context.enable_only(moderngl.NOTHING)
         is_split = settings.split and len(self._sides) == 2
         bar_x = split_x(rect_px, settings.split_position) if is_split else None
-        shown = self._shown(area, bar_x)
-        if self._region is not None:
-            part = whole_pixels(rendered, area)
-            shown = [] if part is None else [(self._sides[-1], part)]
-        if self._around is not None:
-            self._map(self._around, settings)
-        for side, _ in shown:
-            self._map(side, settings)
-            if settings.tile_grid:
-                self._measure_tiles(side)
-            side.lay_over(settings.overlay, self._first_hits)
+        shown = self._shown(area, rendered, bar_x)
+        self._prepare(shown, settings)
         target.use()
         context.scissor = None
         if self._around is not None:
@@ -172,10 +163,23 @@ class Display:
         width, height = selection.scene.settings.size
         return width / height
 
-    def _shown(self, area: Rect[int], bar_x: float | None) -> list[tuple[PictureTextures, Rect[int]]]:
-        """Which side is seen in which part of the area."""
+    def _prepare(self, shown: Sequence[tuple[PictureTextures, Rect[int]]], settings: DisplaySettings) -> None:
+        """Draw into the textures of what is shown what is not there yet."""
+        if self._around is not None:
+            self._map(self._around, settings)
+        for side, _ in shown:
+            self._map(side, settings)
+            if settings.tile_grid:
+                self._measure_tiles(side)
+            side.lay_over(settings.overlay, self._first_hits)
+
+    def _shown(
+        self, area: Rect[int], rendered: Rect[float], bar_x: float | None
+    ) -> list[tuple[PictureTextures, Rect[int]]]:
+        """Which side is seen in which part of the area; `rendered` is where the pictures lie."""
         if bar_x is None:
-            return [(self._sides[-1], area)]
+            part = whole_pixels(rendered, area)
+            return [] if part is None else [(self._sides[-1], part)]
         cut = min(max(round(bar_x), area.left), area.right)
         left = Rect(area.left, area.top, cut - area.left, area.height)
         right = Rect(cut, area.top, area.right - cut, area.height)

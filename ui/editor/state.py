@@ -147,6 +147,8 @@ class Screen:
     is_renaming          the name of the active one is to be typed in the outliner.
     menu_point           where in the picture a menu was asked for, until it is known what is there.
     dropped              the material that was dropped on the picture, and where, until then.
+    is_alone             the picture has the whole window.
+    is_full_screen       the window has the whole screen.
     """
 
     viewport_size: tuple[int, int] | None = None
@@ -156,3 +158,5 @@ class Screen:
     is_renaming: bool = False
     menu_point: tuple[float, float] | None = None
     dropped: tuple[str, tuple[float, float]] | None = None
+    is_alone: bool = False
+    is_full_screen: bool = False
