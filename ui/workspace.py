@@ -32,6 +32,7 @@ from incpt.ui.preferences import PANELS
 from incpt.ui.rect import Rect
 from incpt.ui.widgets import focus, mixed, places, widgets
 from incpt.ui.widgets.refusals import Refusals
+from incpt.ui.widgets.thumbnails import Thumbnails
 
 
 class Workspace:
@@ -43,6 +44,7 @@ class Workspace:
         self._materials = MaterialsState()
         self._is_uniform = True
         self._devices: list[str] | None = None
+        self._thumbnails = Thumbnails()
         self._layout = Layout()
 
     def draw(self, editor: Editor) -> Rect[float]:
@@ -50,6 +52,7 @@ class Workspace:
         the picture, in points."""
         places.begin_frame()
         focus.begin_frame()
+        self._thumbnails.begin_frame()
         is_alone = editor.screen.is_alone
         chosen = (None if is_alone else menus.draw_menu_bar(editor)) or menus.draw_popups(editor)
         if chosen is not None:
@@ -175,7 +178,7 @@ class Workspace:
                 new = material_panel.draw(old, refusals)
             for other in others if new is not old else ():
                 materials[other] = several.material_alike(old, new, materials[other])
-            new, wanted = textures_panel.draw(new, refusals)
+            new, wanted = textures_panel.draw(new, material, self._thumbnails, refusals)
         if new is not old:
             materials[material] = new
             editor.propose(replace(scene, materials=materials), f"Material {material}", _key())
@@ -189,13 +192,16 @@ class Workspace:
         followed = selected[-1].material if selected else None
         state = self._materials.following(followed, scene.materials)
         users = edits.material_users(scene)
-        outcome, self._materials = materials_panel.draw(scene.materials, users, state, bool(selected))
+        outcome, self._materials = materials_panel.draw(
+            scene.materials, users, state, bool(selected), self._thumbnails
+        )
         chosen = self._materials.chosen
         if chosen is not None:
             with widgets.section(f"{chosen}###chosen") as is_open:
                 if is_open:
                     old = scene.materials[chosen]
-                    new, wanted = textures_panel.draw(material_panel.draw(old, refusals), refusals)
+                    new = material_panel.draw(old, refusals)
+                    new, wanted = textures_panel.draw(new, chosen, self._thumbnails, refusals)
                     if new is not old:
                         changed = replace(scene, materials={**scene.materials, chosen: new})
                         editor.propose(changed, f"Material {chosen}", _key())
@@ -226,7 +232,7 @@ class Workspace:
         scene = editor.scene
         with widgets.section("Environment") as is_open:
             if is_open:
-                environment, asked = environment_panel.draw(scene.environment, refusals)
+                environment, asked = environment_panel.draw(scene.environment, self._thumbnails, refusals)
                 if environment is not scene.environment:
                     editor.propose(replace(scene, environment=environment), "Environment", _key())
                 if asked.is_choose:

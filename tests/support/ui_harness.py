@@ -307,6 +307,7 @@ def acknowledge_textures() -> None:
                 texture.set_tex_id(1)
             texture.status = imgui.ImTextureStatus.ok
         elif texture.status == imgui.ImTextureStatus.want_destroy:
+            texture.set_tex_id(0)
             texture.status = imgui.ImTextureStatus.destroyed
 
 

@@ -139,12 +139,11 @@ def use_texture(editor: Editor, material: str, slot: TextureSlot, path: Path) ->
     editor.propose(editor.scene.with_material(material, **values), "Texture")
 
 
-def drop(editor: Editor, path: Path, slot: TextureSlot | None = None) -> None:
+def drop(editor: Editor, path: Path, slot: tuple[str, TextureSlot] | None = None) -> None:
     """Take a file that was dropped on the window: open a scene, add a mesh, use an environment image; or, on
-    the row of a texture's slot, put it there into the material of the active object."""
-    active = editor.selection.active
-    if slot is not None and active is not None and active in editor.scene.object_index:
-        use_texture(editor, editor.scene.object(active).material, slot, path)
+    the row of a texture's slot, put it there into the material of that name."""
+    if slot is not None and slot[0] in editor.scene.materials:
+        use_texture(editor, *slot, path)
         return
     if insert.file_kind(path) is FileKind.SCENE:
         open_file(editor, path)

@@ -5,10 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from imgui_bundle import imgui
+
 from incpt.scene.environment import Environment
+from incpt.scene.image import Image
 from incpt.scene.sky import Sky
-from incpt.ui.widgets import widgets
+from incpt.ui.widgets import places, widgets
 from incpt.ui.widgets.refusals import Refusals
+from incpt.ui.widgets.thumbnails import Thumbnails
 
 _SKY_INTENSITY = 0.1
 """That of a new sky: by day it is many times brighter than what lamps are made for."""
@@ -22,7 +26,9 @@ class ImageRequest:
     is_remove: bool = False
 
 
-def draw(environment: Environment, refusals: Refusals) -> tuple[Environment, ImageRequest]:
+def draw(
+    environment: Environment, thumbnails: Thumbnails, refusals: Refusals
+) -> tuple[Environment, ImageRequest]:
     """Fields of the environment; returns it after this frame, and what is asked for about its image."""
     color = widgets.color(
         "Colour",
@@ -45,10 +51,7 @@ def draw(environment: Environment, refusals: Refusals) -> tuple[Environment, Ima
     )
     environment = refusals.changed(environment, rotation_y=angle)
     image = environment.image
-    name = "none" if image is None else Path(image.source or "made in Python").name
-    if image is not None and image.is_placeholder:
-        name += ", missing"
-    widgets.value_row("Image", name, "Lat-long OpenEXR")
+    _draw_image(image, thumbnails)
     with widgets.row(""):
         is_choose = widgets.button("Choose…##image")
         widgets.same_line()
@@ -61,6 +64,18 @@ def draw(environment: Environment, refusals: Refusals) -> tuple[Environment, Ima
     if environment.sky is not None:
         environment = refusals.changed(environment, sky=_draw_sky(environment.sky, refusals))
     return environment, ImageRequest(is_choose, is_remove)
+
+
+def _draw_image(image: Image | None, thumbnails: Thumbnails) -> None:
+    name = "none" if image is None else Path(image.source or "made in Python").name
+    if image is not None and image.is_placeholder:
+        name += ", missing"
+    widgets.value_row("Image", name, (image.source if image is not None else None) or "Lat-long OpenEXR")
+    if image is not None:
+        with widgets.row(""):
+            width = imgui.get_content_region_avail().x
+            thumbnails.draw_wide(image, image.pixels, width)
+            places.note("thumbnail environment")
 
 
 def _switched(environment: Environment, is_sky: bool, refusals: Refusals) -> Environment:

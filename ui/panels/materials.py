@@ -11,6 +11,7 @@ from incpt.core.affine import Vector
 from incpt.picture.color import srgb_from_linear
 from incpt.scene.material import Material
 from incpt.ui.widgets import places, theme, widgets
+from incpt.ui.widgets.thumbnails import Thumbnails
 
 _ROWS = 8
 """Height of the list, in rows."""
@@ -52,7 +53,11 @@ class Outcome:
 
 
 def draw(
-    materials: Mapping[str, Material], users: Mapping[str, int], state: MaterialsState, can_assign: bool
+    materials: Mapping[str, Material],
+    users: Mapping[str, int],
+    state: MaterialsState,
+    can_assign: bool,
+    thumbnails: Thumbnails,
 ) -> tuple[Outcome, MaterialsState]:
     """Draw the list, and buttons for the row that is chosen. `users` are how many objects have each;
     `can_assign`: whether objects are selected."""
@@ -69,7 +74,7 @@ def draw(
         clipper.begin(len(names))
         while clipper.step():
             for name in names[clipper.display_start : clipper.display_end]:
-                outcome, state = _row(name, materials, users.get(name, 0), outcome, state)
+                outcome, state = _row(name, materials, users.get(name, 0), outcome, state, thumbnails)
         if not names:
             imgui.text_disabled("No material has that in its name." if materials else "There is none.")
     imgui.end_child()
@@ -97,7 +102,12 @@ def dropped_on_item(names: tuple[str, ...]) -> str | None:
 
 
 def _row(
-    name: str, materials: Mapping[str, Material], users: int, outcome: Outcome, state: MaterialsState
+    name: str,
+    materials: Mapping[str, Material],
+    users: int,
+    outcome: Outcome,
+    state: MaterialsState,
+    thumbnails: Thumbnails,
 ) -> tuple[Outcome, MaterialsState]:
     imgui.push_id(name)
     flags = imgui.SelectableFlags_.allow_double_click
@@ -108,7 +118,7 @@ def _row(
         imgui.set_drag_drop_payload_py_id(_PAYLOAD, list(materials).index(name))
         imgui.text_unformatted(f"{name}: drop it on an object")
         imgui.end_drag_drop_source()
-    _draw_ball(materials[name], start, side)
+    _draw_ball(materials[name], start, side, thumbnails)
     count = f"{users:,}" if users else "unused"
     tint = imgui.get_color_u32(imgui.ImVec4(*theme.QUIET))
     right = start.x + imgui.get_content_region_avail().x - imgui.calc_text_size(count).x
@@ -121,9 +131,15 @@ def _row(
     return outcome, state
 
 
-def _draw_ball(material: Material, at: imgui.ImVec2, side: float) -> None:
-    """A ball that looks as the parameters alone say: its colour, the highlight of a smooth one, glass as a
-    ring, and lamps without a shadow side."""
+def _draw_ball(material: Material, at: imgui.ImVec2, side: float, thumbnails: Thumbnails) -> None:
+    """A ball that looks as the parameters say: its colour or the image of it, the highlight of a smooth one,
+    glass as a ring, and lamps without a shadow side."""
+    texture = material.emission_texture if material.is_emissive else material.base_color_texture
+    if texture is not None:
+        inset = 0.04 * side
+        place = at.x + inset, at.y + inset
+        thumbnails.draw_round(texture.bitmap, texture.bitmap.pixels, place, side - 2 * inset)
+        return
     canvas, radius = imgui.get_window_draw_list(), 0.46 * side
     middle = (at.x + 0.5 * side, at.y + 0.5 * side)
     lit, dark = _tints(material)

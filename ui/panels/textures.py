@@ -1,4 +1,4 @@
-"""The textures of a material: which image each parameter is read from."""
+"""The textures of a material: which image each parameter is read from, and from where that is."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from imgui_bundle import imgui
 from incpt.core.layout import TextureSlot
 from incpt.scene.material import Material, texture_name, texture_of
 from incpt.scene.texture import Texture
-from incpt.ui.rect import Rect
-from incpt.ui.widgets import places, widgets
+from incpt.ui.widgets import places, theme, widgets
 from incpt.ui.widgets.refusals import Refusals
+from incpt.ui.widgets.thumbnails import Thumbnails
 
 _LABELS = {
     TextureSlot.BASE_COLOR: ("Base colour map", "Times the base colour"),
@@ -49,6 +49,18 @@ _OF_PART = {
 """The parameter without which a slot has nothing to act on, and no row."""
 
 
+_COLORS = (
+    TextureSlot.BASE_COLOR,
+    TextureSlot.EMISSION,
+    TextureSlot.SPECULAR_COLOR,
+    TextureSlot.SHEEN_COLOR,
+    TextureSlot.DIFFUSE_TRANSMISSION_COLOR,
+)
+"""The slots whose images are colours; others are plain numbers."""
+_PREVIEW_LINES = 14.0
+"""Edge of the larger picture that hovering shows, in heights of a line."""
+
+
 @dataclass(frozen=True)
 class TextureRequest:
     """The slot that the user wants another image for, if any."""
@@ -56,26 +68,26 @@ class TextureRequest:
     choose: TextureSlot | None = None
 
 
-def draw(material: Material, refusals: Refusals) -> tuple[Material, TextureRequest]:
-    """A row for each slot; returns the material after this frame, and what is asked for."""
+def draw(
+    material: Material, name: str, thumbnails: Thumbnails, refusals: Refusals
+) -> tuple[Material, TextureRequest]:
+    """A row for each slot of the material of that name; returns the material after this frame, and what is
+    asked for."""
     request = TextureRequest()
     is_used = any(texture_of(material, slot) is not None for slot in TextureSlot)
     with widgets.section("Textures", is_used) as is_open:
         if not is_open:
             return material, request
-        for slot, (label, tip) in _LABELS.items():
-            texture, name = texture_of(material, slot), texture_name(slot)
+        for slot in _LABELS:
+            texture = texture_of(material, slot)
             if texture is None and not _is_shown(material, slot):
                 continue
-            with widgets.row(label, tip):
-                if widgets.button(f"Choose…##{name}", "An image file; or drop one here"):
-                    request = TextureRequest(slot)
-                places.note_rect(f"slot {name}", _row_rect())
-                widgets.same_line()
-                if widgets.button(f"Remove##{name}", enabled=texture is not None):
-                    material = refusals.changed(material, **{name: None})
-            if texture is not None:
-                widgets.value_row("   File", _described(texture), tip)
+            asked = _draw_slot(slot, texture, thumbnails)
+            places.note(f"slot {texture_name(slot)} of {name}")
+            if asked == "choose":
+                request = TextureRequest(slot)
+            if asked == "remove":
+                material = refusals.changed(material, **{texture_name(slot): None})
             if slot is TextureSlot.NORMAL:
                 material = _draw_strength(material, refusals, "normal_scale", "Normal strength")
             if slot is TextureSlot.BUMP:
@@ -85,22 +97,66 @@ def draw(material: Material, refusals: Refusals) -> tuple[Material, TextureReque
         return material, request
 
 
-def slot_at(x: float, y: float) -> TextureSlot | None:
-    """The slot whose row was drawn at this place of the window, in points; None: there is none."""
-    for slot in TextureSlot:
-        name = texture_name(slot)
-        row, button = places.find(f"slot {name}"), places.find(f"Choose…##{name}")
-        # A row that its panel has scrolled out of sight has no button.
-        if row is not None and button is not None and row.contains((x, y)):
-            return slot
+def slot_at(x: float, y: float) -> tuple[str, TextureSlot] | None:
+    """The name of a material and its slot whose row was drawn at this place of the window, in points; None:
+    there is none."""
+    slots = {texture_name(slot): slot for slot in TextureSlot}
+    for place in places.names():
+        row = places.find(place)
+        if place.startswith("slot ") and row is not None and row.contains((x, y)):
+            slot, _, material = place.removeprefix("slot ").partition(" of ")
+            return material, slots[slot]
     return None
 
 
-def _row_rect() -> Rect[float]:
-    """The whole row of the widget drawn last, across the panel."""
-    left, width = imgui.get_window_pos().x, imgui.get_window_width()
-    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-    return Rect(left, low.y, width, high.y - low.y)
+def _draw_slot(slot: TextureSlot, texture: Texture | None, thumbnails: Thumbnails) -> str:
+    """The row of a slot; returns "choose" or "remove" where one of its buttons was pressed, else nothing."""
+    (label, tip), asked = _LABELS[slot], ""
+    imgui.begin_group()
+    with widgets.row(label, tip):
+        if texture is not None:
+            _draw_thumbnail(slot, texture, thumbnails)
+            widgets.same_line()
+        imgui.begin_group()
+        if texture is not None:
+            widgets.clipped_text(_described(texture), imgui.get_content_region_avail().x)
+        if widgets.button(f"Choose…##{texture_name(slot)}", "An image file; or drop one here"):
+            asked = "choose"
+        widgets.same_line()
+        if widgets.button(f"Remove##{texture_name(slot)}", enabled=texture is not None):
+            asked = "remove"
+        imgui.end_group()
+    imgui.end_group()
+    return asked
+
+
+def _draw_thumbnail(slot: TextureSlot, texture: Texture, thumbnails: Thumbnails) -> None:
+    bitmap = texture.bitmap
+    side = imgui.get_text_line_height() + imgui.get_style().item_spacing.y + imgui.get_frame_height()
+    thumbnails.draw(bitmap, bitmap.pixels, side)
+    places.note(f"thumbnail {texture_name(slot)}")
+    if not imgui.begin_item_tooltip():
+        return
+    thumbnails.draw(bitmap, bitmap.pixels, imgui.get_text_line_height() * _PREVIEW_LINES)
+    imgui.text_unformatted(bitmap.source.file or "Made in Python")
+    if bitmap.source.index is not None:
+        imgui.text_unformatted(f"Its image {bitmap.source.index}")
+    widgets.note(kind_text(slot, texture), theme.QUIET)
+    imgui.end_tooltip()
+
+
+def kind_text(slot: TextureSlot, texture: Texture) -> str:
+    """What the pixels of an image are, and how they are read."""
+    bitmap = texture.bitmap
+    channels = {1: "grey", 2: "grey and alpha", 3: "RGB", 4: "RGB and alpha"}[bitmap.channels]
+    bits = bitmap.pixels.dtype.itemsize * 8
+    depth = f"{bits}-bit float" if bitmap.pixels.dtype.kind == "f" else f"{bits}-bit"
+    is_linear = bitmap.pixels.dtype.kind == "f"
+    meaning = "plain numbers"
+    if slot in _COLORS:
+        meaning = "linear colours" if is_linear else "colours in sRGB"
+    size = "missing" if bitmap.is_placeholder else f"{bitmap.width} × {bitmap.height}"
+    return f"{size}, {depth} {channels}, {meaning}, UV set {texture.uv_set}"
 
 
 def _is_shown(material: Material, slot: TextureSlot) -> bool:

@@ -35,7 +35,7 @@ def row(label: str, tip: str = "") -> Iterator[str]:
     width = imgui.get_content_region_avail().x
     start = imgui.get_cursor_pos_x()
     imgui.align_text_to_frame_padding()
-    _clipped_text(label, width * _LABEL_SHARE)
+    clipped_text(label, width * _LABEL_SHARE)
     if tip:
         imgui.set_item_tooltip(tip)
     imgui.same_line(start + width * _LABEL_SHARE)
@@ -234,7 +234,7 @@ def value_row(label: str, value: str, tip: str = "") -> None:
     """A value that is shown only."""
     with row(label, tip):
         imgui.align_text_to_frame_padding()
-        _clipped_text(value, imgui.get_content_region_avail().x)
+        clipped_text(value, imgui.get_content_region_avail().x)
         places.note(label)
 
 
@@ -291,7 +291,8 @@ def _axis_mark(axis: int, name: str) -> None:
     draw.add_text(place, imgui.get_color_u32(imgui.ImVec4(*theme.QUIET)), name)
 
 
-def _clipped_text(label: str, width: float) -> None:
+def clipped_text(label: str, width: float) -> None:
+    """A text that is cut where it has not the room; hovering shows all of it."""
     shown = label
     while len(shown) > 1 and imgui.calc_text_size(shown).x > width - imgui.get_style().item_inner_spacing.x:
         shown = shown[:-2].rstrip() + "…"

@@ -437,7 +437,8 @@ def test_an_image_dropped_on_a_slot_is_its_texture(user: Desk, tmp_path: Path) -
     user.click("Textures")
     user.frames(2)
     x, y = user.place("Choose…##normal_texture")
-    assert textures.slot_at(x, y) is TextureSlot.NORMAL and textures.slot_at(x - 80, y) is TextureSlot.NORMAL
+    for across in (0, -80):
+        assert textures.slot_at(x + across, y) == ("red", TextureSlot.NORMAL)
     assert textures.slot_at(*user.place("picture")) is None
     slot = textures.slot_at(*user.place("Choose…##base_color_texture"))
     assert user.editor.attempt(lambda: files.drop(user.editor, tmp_path / "wood.png", slot))
