@@ -72,6 +72,7 @@ RIGHT: Mapping[str, Mapping[str, Any]] = {
     "Session.pass_image": {"name": "radiance"},
     "Session.pick": {"pixel": (3, 3)},
     "Session.pick_point": {"point": (0.5, 0.5)},
+    "Session.place_at": {"point": (0.5, 0.5)},
     "Scene.object": {"name": "red cube"},
     "Scene.light": {"name": "lamp"},
     "Scene.placed": {"name": "red cube"},

@@ -86,6 +86,8 @@ def _take_outcome(editor: Editor, outcome: Outcome) -> None:
         editor.select(outcome.selection)
     if outcome.region is not None:
         editor.show_region(outcome.region)
+    if outcome.aim is not None:
+        editor.aim(outcome.aim)
     editor.change_display(outcome.display)
     if isinstance(outcome.pick, PickBox):
         editor.pick_box(outcome.pick)

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from incpt.core import layout
+from incpt.core.affine import Vector
 from incpt.core.settings import RenderSettings
 from incpt.render import tiles
 from incpt.render.batch import Batch
@@ -95,20 +96,41 @@ def object_at(
 ) -> str | None:
     """The name of the object or light at a point (x, y) from the top left, in units of the picture, or
     None."""
+    scene = tables.scene
+    origin, direction, depth, index = _met(tracer, tables, settings, point)
+    light = nearest_seen(scene.lights, origin, direction, depth)
+    if light is not None:
+        return light.name
+    return scene.objects[index].name if index >= 0 else None
+
+
+def place_at(
+    tracer: Tracer, tables: SceneTables, settings: RenderSettings, point: tuple[float, float]
+) -> Vector | None:
+    """The place in world space of the surface at a point (x, y) from the top left, in units of the picture,
+    or None."""
+    origin, direction, depth, index = _met(tracer, tables, settings, point)
+    if index < 0:
+        return None
+    x, y, z = (float(v) for v in np.asarray(origin) + depth * direction)
+    return x, y, z
+
+
+def _met(
+    tracer: Tracer, tables: SceneTables, settings: RenderSettings, point: tuple[float, float]
+) -> tuple[Vector, npt.NDArray[np.float64], float, int]:
+    """The camera ray through a point: its origin, its direction (of unit length), how far it goes, metres,
+    and the index of the object that it meets; -1 where it meets none."""
     params = path_params(tables, settings)
     # The point is the centre of a picture of one pixel.
     aim_at(params, 2 * point[0] - 1, 1 - 2 * point[1])
     params["width"] = params["height"] = params["tile_size"] = 1
     surface, object_ids = _traced(tracer, tables, one_slot(), params)
-    index, scene = int(object_ids[0]), tables.scene
-    width, height = settings.size
-    origins, directions = scene.camera.rays(np.array([point]), width / height)
+    camera, (width, height) = tables.scene.camera, settings.size
+    origins, directions = camera.rays(np.array([point]), width / height)
     length = float(np.linalg.norm(directions[0]))
-    depth = float(surface[3]) + scene.camera.near * length
-    light = nearest_seen(scene.lights, origins[0], directions[0] / length, depth)
-    if light is not None:
-        return light.name
-    return scene.objects[index].name if index >= 0 else None
+    depth = float(surface[3]) + camera.near * length
+    return origins[0], directions[0] / length, depth, int(object_ids[0])
 
 
 def one_slot() -> npt.NDArray[np.void]:

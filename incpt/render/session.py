@@ -16,6 +16,7 @@ from types import NoneType
 import numpy as np
 import numpy.typing as npt
 
+from incpt.core.affine import Vector
 from incpt.core.checks import pair, require, require_bool, require_call, whole
 from incpt.core.errors import InputError
 from incpt.core.layout import Counter
@@ -367,6 +368,14 @@ class Session:
         if not (0 <= x <= 1 and 0 <= y <= 1):
             return None
         return first_hits.object_at(self._tracer, self._tables, self.settings, (x, y))
+
+    def place_at(self, point: tuple[float, float]) -> Vector | None:
+        """The place in world space of the surface at a point (x, y) from the top left, in units of the image,
+        or None: where there is none, and outside the image."""
+        x, y = pair("point", point, "a place (x, y) in the image")
+        if not (0 <= x <= 1 and 0 <= y <= 1):
+            return None
+        return first_hits.place_at(self._tracer, self._tables, self.settings, (x, y))
 
     def build(self, on_progress: Callable[[int, int], None] | None = None, for_edits: bool = True) -> None:
         """Build every kernel that the scene as it is now needs, so that no later call has to wait for one;

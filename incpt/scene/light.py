@@ -24,6 +24,8 @@ from incpt.scene.transform import IDENTITY, Transform
 
 KINDS = ("point", "spot", "sun", "rectangle", "disk", "sphere")
 """Every kind of light."""
+DIRECTED = ("spot", "sun", "rectangle", "disk")
+"""Those that shine along -z; the others shine into all directions."""
 STRENGTHS = ("power", "radiance", "irradiance")
 """The quantities of which one says how much a light emits."""
 SMALLEST_SIZE = 1e-7

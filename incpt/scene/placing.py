@@ -28,6 +28,8 @@ _SAME_ROTATION_DEG = 1e-4
 """Angles that differ by less are the same: a gizmo's matrices are float32."""
 _RIGID = 1e-5
 """Factors of matrices that differ by less are the same for that reason: nothing was turned, or scaled."""
+_OPPOSITE = 1e-9
+"""The sine below which two directions are the same, or opposite."""
 _DIGITS = 10
 """Decimals of angles and factors that mean something: what lies below is rounding."""
 
@@ -54,6 +56,23 @@ def turned_by(one: Placed, turn: Array, pivot: Array) -> Placed:
         return result
     x, y, z = (round(angle, _DIGITS) for angle in result.rotation)
     return replace(result, transform=result.transform.with_parts(rotation=(x, y, z)))
+
+
+def aimed(one: Placed, at: Numbers) -> Placed:
+    """Turned as little as can be, so that its -z, along which lights shine, points to a place in world space;
+    as it was where it stands there."""
+    way = np.asarray(at, np.float64) - one.position
+    length = float(np.linalg.norm(way))
+    if length == 0:
+        return one
+    old, new = -affine.rotation_matrix(one.rotation)[:, 2], way / length
+    axis = np.cross(old, new)
+    sine = float(np.linalg.norm(axis))
+    if sine < _OPPOSITE:
+        # Any axis across does where it is turned round.
+        axis = affine.rotation_matrix(one.rotation)[:, 0]
+    degrees = math.degrees(math.atan2(sine, float(old @ new)))
+    return turned(one, axis / np.linalg.norm(axis), degrees, np.asarray(one.position))
 
 
 def scaled(one: Placed, axes: Array, factors: Numbers, pivot: Array) -> Placed:

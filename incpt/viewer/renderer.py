@@ -16,6 +16,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from incpt.core.affine import Vector
 from incpt.render.final import FinalSettings
 from incpt.scene.model import Scene
 from incpt.viewer.view import Frame, View
@@ -37,6 +38,13 @@ class PickBox:
     low: tuple[float, float]
     high: tuple[float, float]
     takes_out: bool = False
+
+
+@dataclass(frozen=True)
+class PickPlace:
+    """Which place in the world is seen at `point`, in units of the image from the top left?"""
+
+    point: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -98,7 +106,9 @@ class EndFinal:
     is_kept: bool
 
 
-Request = Pick | PickBox | Export | Copy | Pin | TakeNow | Forget | Restart | RenderFinal | EndFinal
+Request = (
+    Pick | PickBox | PickPlace | Export | Copy | Pin | TakeNow | Forget | Restart | RenderFinal | EndFinal
+)
 
 
 @dataclass(frozen=True)
@@ -124,6 +134,13 @@ class PickedBox:
 
     names: tuple[str, ...]
     takes_out: bool
+
+
+@dataclass(frozen=True)
+class PickedPlace:
+    """The answer to a PickPlace: a point of a surface, world space, or None."""
+
+    place: Vector | None
 
 
 @dataclass(frozen=True)
@@ -184,7 +201,18 @@ class Problem:
     fatal: bool = False
 
 
-Message = Frame | Building | Picked | PickedBox | Exported | CopiedPicture | Waiting | Finals | Problem
+Message = (
+    Frame
+    | Building
+    | Picked
+    | PickedBox
+    | PickedPlace
+    | Exported
+    | CopiedPicture
+    | Waiting
+    | Finals
+    | Problem
+)
 
 
 class Renderer(Protocol):

@@ -33,6 +33,8 @@ from incpt.viewer.renderer import (
     PickBox,
     Picked,
     PickedBox,
+    PickedPlace,
+    PickPlace,
     Pin,
     Problem,
     RenderFinal,
@@ -230,6 +232,8 @@ class ThreadedRenderer:
                 self._post(Picked(request.point, viewer.pick(request.point), request.additive))
             elif isinstance(request, PickBox):
                 self._post(PickedBox(viewer.pick_box(request.low, request.high), request.takes_out))
+            elif isinstance(request, PickPlace):
+                self._post(PickedPlace(viewer.session.place_at(request.point)))
             elif isinstance(request, Export):
                 denoised = self._denoiser.denoised if request.denoise else None
                 viewer.export(request.path, request.aovs, request.exposure, request.curve, denoised)

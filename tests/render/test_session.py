@@ -592,6 +592,22 @@ def test_picks_what_is_under_a_point(device: Device) -> None:
             assert session.pick((x, y)) == (names[ids[y, x]] if ids[y, x] >= 0 else None)
 
 
+def test_a_place_is_on_the_surface_that_is_seen(device: Device) -> None:
+    scene = mixed_scene()
+    for camera in (scene.camera, replace(scene.camera, projection="orthographic", near=0.5)):
+        session = Session(replace(scene, camera=camera), device=device)
+        hits = session.first_hits()
+        for x, y in ((22, 14), (3, 25), (34, 16)):
+            place = session.place_at(((x + 0.5) / 44, (y + 0.5) / 28))
+            assert place is not None
+            where, _ = camera.project(np.array([place]), 44 / 28)
+            np.testing.assert_allclose(where[0] * (44, 28), (x + 0.5, y + 0.5), atol=1e-3)
+            starts, _ = camera.rays(np.array([[(x + 0.5) / 44, (y + 0.5) / 28]]), 44 / 28)
+            assert np.linalg.norm(place - starts[0]) == pytest.approx(float(hits.depth[y, x]), rel=1e-4)
+    session = Session(scene, device=device)
+    assert session.place_at((0.02, 0.02)) is None and session.place_at((1.5, 0.5)) is None
+
+
 def test_pick_passes_hidden_objects(device: Device) -> None:
     session = Session(mixed_scene().with_object("red cube", visible=False), device=device)
     assert session.pick((22, 14)) != "red cube"

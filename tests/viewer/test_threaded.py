@@ -30,6 +30,8 @@ from incpt.viewer.renderer import (
     PickBox,
     Picked,
     PickedBox,
+    PickedPlace,
+    PickPlace,
     Pin,
     Problem,
     Renderer,
@@ -105,6 +107,9 @@ def test_answers_requests(renderer: ThreadedRenderer, tmp_path: Path) -> None:
     assert wait_for(renderer, Picked) == Picked((0.0, 0.0), None, False)
     renderer.request(PickBox((0.48, 0.48), (0.52, 0.52), takes_out=True))
     assert wait_for(renderer, PickedBox) == PickedBox(("red cube",), True)
+    renderer.request(PickPlace((0.5, 0.5)))
+    place = wait_for(renderer, PickedPlace)
+    assert isinstance(place, PickedPlace) and place.place is not None and abs(place.place[0]) < 0.1
     renderer.request(Export(tmp_path / "a.exr", aovs=True))
     assert wait_for(renderer, Exported) == Exported(tmp_path / "a.exr", mixed_scene().settings.size)
     assert (tmp_path / "a.exr").stat().st_size > 1000

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from incpt.scene import edits
+from incpt.scene.light import DIRECTED
 from incpt.scene.selection import Selection
 from incpt.scene.transform import IDENTITY
 from incpt.ui.commands.window import show_panels, switch_panel
@@ -40,6 +41,14 @@ def add_shape(editor: Editor, shape: str) -> None:
     """A new object of that shape, selected."""
     scene, names = edits.add_shape(editor.shown, shape)
     editor.propose(scene, f"Add {shape}", selection=Selection(names))
+
+
+def has_light(editor: Editor) -> bool:
+    """Whether a light is selected that shines in one direction."""
+    lights = editor.scene.light_index
+    return any(
+        name in lights and editor.scene.light(name).kind in DIRECTED for name in editor.selection.names
+    )
 
 
 def add_light(editor: Editor, kind: str) -> None:

@@ -203,6 +203,8 @@ COMMANDS: tuple[Command, ...] = (
                  "number is clockwise. In the plain set R alone is for the handles"),
     Command("Scale", "Object/Transform", _begin("scale", "Scale"), "S", enabled=_shows_selected,
             help="The mouse scales it, with the same keys"),
+    Command("Aim light", "Object", _begin("aim", "Aim light"), "Shift+T", enabled=objects.has_light,
+            help="The selected lights shine at what is clicked next"),
     Command("Duplicate", "Object", objects.duplicate, plain_keys="Ctrl+D", enabled=_selected,
             group=1, help="Copy the selected objects, in their place"),
     Command("Duplicate and move", "Object", objects.duplicate_and_move, "Shift+D", enabled=_selected,
@@ -291,7 +293,7 @@ COMMANDS: tuple[Command, ...] = (
 SELECTION_MENU: tuple[tuple[str, ...], ...] = (
     ("Move", "Rotate", "Scale"),
     ("Duplicate and move", "Copy", "Paste", "Delete", "Rename…"),
-    ("Hide", "Frame selected"),
+    ("Aim light", "Hide", "Frame selected"),
     ("Clear position", "Clear rotation", "Clear scale"),
 )
 """What can be done with what is selected, by names of commands, in groups."""

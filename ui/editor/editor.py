@@ -17,9 +17,10 @@ from typing import Any
 
 from incpt.core.errors import DeviceError, InputError, OutputError, one_line
 from incpt.picture import denoise
-from incpt.scene import edits, summary
+from incpt.scene import edits, placing, summary
 from incpt.scene.camera import Camera
 from incpt.scene.edits import Copied
+from incpt.scene.light import DIRECTED
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
 from incpt.ui.display.overlays import NEEDS_FIRST_HITS
@@ -40,6 +41,8 @@ from incpt.viewer.renderer import (
     PickBox,
     Picked,
     PickedBox,
+    PickedPlace,
+    PickPlace,
     Problem,
     Renderer,
     Restart,
@@ -245,6 +248,10 @@ class Editor:
         self.screen = replace(self.screen, dropped=(material, point))
         self.renderer.request(Pick(point))
 
+    def aim(self, point: Point) -> None:
+        """Turn the selected lights to what is seen at a point of the picture."""
+        self.renderer.request(PickPlace(self._in_region(point)))
+
     def show_region(self, box: Rect[float] | None) -> None:
         """Render a region of the picture alone from now on, given in units of it; None: all of it."""
         region = None if box is None else region_of(box, self.scene.settings.size)
@@ -371,6 +378,8 @@ class Editor:
                     self._take_pick(message)
                 case PickedBox():
                     self.select(self.selection.boxed(message.names, message.takes_out))
+                case PickedPlace():
+                    self._take_place(message)
                 case Exported():
                     width, height = message.size
                     self.say(f"{message.path} is written, {width} × {height} pixels", "done")
@@ -396,6 +405,14 @@ class Editor:
             self.open_menu("selection")
         else:
             self.select(self.selection.clicked(picked.name, picked.additive))
+
+    def _take_place(self, picked: PickedPlace) -> None:
+        if picked.place is None:
+            self.say("Nothing is there to aim at: click a surface", "warning")
+            return
+        lights = [one for one in self.scene.lights if one.name in self.selection and one.kind in DIRECTED]
+        aimed = {one.name: placing.aimed(one, picked.place) for one in lights}
+        self.propose(edits.with_all(self.scene, aimed), "Aim light")
 
     def _assign_dropped(self, material: str, name: str | None) -> None:
         if name is None or name not in self.scene.object_index:

@@ -103,8 +103,8 @@ TRANSFORM_KEY = "transform"
 
 @dataclass(frozen=True)
 class Beginning:
-    """What a command begins in the picture: move, rotate, scale, box or region; `label` is the name of the
-    edit."""
+    """What a command begins in the picture: move, rotate, scale, box, region or aim; `label` is the name of
+    the edit."""
 
     action: str
     label: str

@@ -55,7 +55,7 @@ class BoxSelect:
             self._start = at
         start = self._start
         if start is None:
-            _draw_cross(at)
+            draw_cross(at)
             return None
         rect = between(start, at)
         _draw(rect)
@@ -79,7 +79,8 @@ def _draw(rect: Rect[float]) -> None:
     canvas.add_rect(low, high, imgui.get_color_u32(imgui.ImVec4(*theme.ACCENT)))
 
 
-def _draw_cross(at: Point) -> None:
+def draw_cross(at: Point) -> None:
+    """Draw lines across the window through the mouse."""
     canvas, size = imgui.get_background_draw_list(), imgui.get_io().display_size
     tint = imgui.get_color_u32(imgui.ImVec4(*theme.TEXT[:3], 0.5))
     canvas.add_line((at[0], 0.0), (at[0], size.y), tint)

@@ -55,11 +55,19 @@ class Gizmo:
         self.is_over = False
 
     def draw(
-        self, scene: Scene, names: tuple[str, ...], tool: Tool, snap: SnapSettings, picture: Rect[float]
+        self,
+        scene: Scene,
+        names: tuple[str, ...],
+        tool: Tool,
+        snap: SnapSettings,
+        picture: Rect[float],
+        *,
+        is_enabled: bool = True,
     ) -> Scene:
         """Draw the handles over the picture, which lies at `picture` in points, and return the scene after
-        this frame."""
+        this frame. Where they are not enabled, the mouse is at something else."""
         _gizmo.begin_frame()
+        _gizmo.enable(is_enabled)
         visible = tuple(name for name in names if scene.placed(name).visible)
         if not visible:
             self.is_using = self.is_over = False

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 from imgui_bundle import imgui
@@ -18,6 +20,8 @@ REACH = 9.0
 """How near to an icon the mouse has to be to pick it, in points; also the icon's own reach."""
 _PLAIN = (0.98, 0.9, 0.62)
 """Colour of the lines of lights that are not selected: sRGB, 0 to 1."""
+_WIDEST_SHOWN = 170.0
+"""The widest cone that is drawn, degrees."""
 _SEGMENTS = 32
 _RAYS = 8
 
@@ -81,8 +85,7 @@ def on_screen(camera: Camera, line: Array, picture: Rect[float]) -> Array | None
 def shape_lines(light: Light) -> list[Array]:
     """Lines (N, 3) in world space that show the shape of a light and where it shines to."""
     x, y, z = light.axes
-    center, (a, b) = np.array(light.position), light.half_size
-    reach = max(a, b, 0.1 * max(np.abs(light.position).max(), 1.0) if light.is_far else 0.0, 0.05)
+    center, (a, b), length = np.array(light.position), light.half_size, shown_length(light)
     turn = np.linspace(0, 2 * np.pi, _SEGMENTS + 1)
     circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
 
@@ -91,19 +94,31 @@ def shape_lines(light: Light) -> list[Array]:
 
     if light.kind == "rectangle":
         corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)])
-        return [center + corners[:, :1] * a * x + corners[:, 1:] * b * y, _way(center, z, 2 * reach)]
+        return [center + corners[:, :1] * a * x + corners[:, 1:] * b * y, _way(center, z, length)]
     if light.kind == "disk":
-        return [around(a * x, b * y, center), _way(center, z, 2 * reach)]
+        return [around(a * x, b * y, center), _way(center, z, length)]
     if light.kind == "sun":
-        return [_way(center, z, 4 * reach)]
+        return [_way(center, z, length)]
     ball = [around(a * u, a * v, center) for u, v in ((x, y), (y, z), (z, x))] if a > 0 else []
     if light.kind == "spot":
-        length = max(4 * a, 1.0)
-        wide = length * np.tan(np.radians(min(light.spot_angle, 170.0)) / 2)
+        wide = length * math.tan(shown_half_cone(light))
         end = center - length * z
         edges = [np.array([center, end + wide * side]) for side in (x, y, -x, -y)]
         return [*ball, around(wide * x, wide * y, end), *edges]
     return ball
+
+
+def shown_length(light: Light) -> float:
+    """Of the line along which a light shines, as it is drawn, metres."""
+    if light.kind == "spot":
+        return max(4 * light.half_size[0], 1.0)
+    far = 0.1 * max(abs(component) for component in (*light.position, 1.0)) if light.is_far else 0.0
+    return (4 if light.is_far else 2) * max(*light.half_size, far, 0.05)
+
+
+def shown_half_cone(light: Light) -> float:
+    """Half of the angle of a spot's cone, as it is drawn, radians."""
+    return math.radians(min(light.spot_angle, _WIDEST_SHOWN)) / 2
 
 
 def _way(center: Array, z: Array, length: float) -> Array:

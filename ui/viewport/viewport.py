@@ -17,9 +17,11 @@ from incpt.ui.display.projection import split_x
 from incpt.ui.editor.state import TRANSFORM_KEY, Beginning, Tool
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
 from incpt.ui.rect import Point, Rect
-from incpt.ui.viewport import box_select, light_marks, modal_input, modal_marks
+from incpt.ui.viewport import box_select, light_marks, modal_input, modal_marks, point_pick
 from incpt.ui.viewport.box_select import BoxSelect
 from incpt.ui.viewport.gizmo import Gizmo
+from incpt.ui.viewport.light_handles import LightHandles
+from incpt.ui.viewport.point_pick import PointPick
 from incpt.ui.viewport.transform_mode import TransformMode
 from incpt.ui.widgets import places
 from incpt.viewer.renderer import Pick, PickBox
@@ -54,6 +56,7 @@ class Outcome:
     proposals                   the edits that led to `scene`, one after the other.
     pick                        a click or a box on the picture, to be asked of the renderer.
     region                      a box that was drawn as the region to be rendered, in units of the picture.
+    aim                         a point of the picture, in the same units, at which lights shall shine.
     wants_menu                  the click asks for the menu of what is selected, if it is on that.
     """
 
@@ -63,6 +66,7 @@ class Outcome:
     proposals: tuple[Proposal, ...] = ()
     pick: Pick | PickBox | None = None
     region: Rect[float] | None = None
+    aim: Point | None = None
     wants_menu: bool = False
 
     def proposed(self, proposal: Proposal) -> Outcome:
@@ -92,6 +96,8 @@ class Viewport:
         self.gizmo = Gizmo()
         self._transform = TransformMode()
         self._box = BoxSelect()
+        self._point = PointPick()
+        self._handles = LightHandles()
         self._held_by_gizmo: tuple[int, tuple[str, ...]] = (0, ())
         self._press: _Press | None = None
         self._holds_bar = False
@@ -128,7 +134,11 @@ class Viewport:
             outcome = self._use_transform(outcome, preferences.snap, picture)
         elif self._box.is_on:
             outcome = self._use_box(outcome, picture)
+        elif self._point.is_on:
+            at = self._point.update(is_blocked=self._is_blocked)
+            outcome = outcome if at is None else replace(outcome, aim=picture.relative(at))
         else:
+            outcome = self._use_handles(outcome, picture)
             outcome = self._use_gizmo(outcome, tool, preferences.snap, picture)
             outcome = self._use_bar(outcome, picture)
             outcome = self._use_mouse(outcome, preferences, picture)
@@ -141,7 +151,8 @@ class Viewport:
         """Whether the gizmo, the bar or the camera is being dragged, or a transform is under way."""
         is_dragging = self._press is not None and self._press.is_drag
         is_steered = self._transform.is_on or self._flies_freely
-        return self.gizmo.is_using or self._holds_bar or is_dragging or is_steered
+        has_handle = self.gizmo.is_using or self._handles.is_held
+        return has_handle or self._holds_bar or is_dragging or is_steered
 
     @property
     def is_flying(self) -> bool:
@@ -154,6 +165,8 @@ class Viewport:
         """What the keys do while something in the picture takes them, one line; empty: they are commands."""
         if self._box.is_on:
             return box_select.REGION_HINT if self._box.is_region else box_select.HINT
+        if self._point.is_on:
+            return point_pick.HINT
         return modal_marks.HINT if self._transform.is_on else ""
 
     def let_go(self) -> None:
@@ -162,6 +175,8 @@ class Viewport:
         self.gizmo.give_up()
         self._transform.stop()
         self._box.stop()
+        self._point.stop()
+        self._handles.give_up()
         self._press = None
 
     # ------------------------------------------------------------------- what commands begin here
@@ -178,6 +193,9 @@ class Viewport:
         self.gizmo.is_over = False
         if beginning.action in ("box", "region"):
             self._box.begin(is_region=beginning.action == "region")
+            return
+        if beginning.action == "aim":
+            self._point.begin()
             return
         names = outcome.selection.names
         self._transform.begin(beginning, outcome.scene, names, snap, picture, tool.pivot)
@@ -205,13 +223,22 @@ class Viewport:
         pick = PickBox(low, high, box.takes_out)
         return replace(outcome, selection=selection.boxed(lights, box.takes_out), pick=pick)
 
-    # ----------------------------------------------------------------------------------- the gizmo
+    # ------------------------------------------------------------------- handles of lights, the gizmo
+
+    def _use_handles(self, outcome: Outcome, picture: Rect[float]) -> Outcome:
+        if not outcome.display.outline:
+            return outcome
+        # They are small, and go before what lies under them.
+        is_free = picture.contains(_mouse()) and self._is_free(Button.MIDDLE)
+        scene = self._handles.update(outcome.scene, outcome.selection.active, picture, is_free)
+        return outcome.proposed(Proposal(scene, "Light", f"light handle {self._handles.drags}"))
 
     def _use_gizmo(self, outcome: Outcome, tool: Tool, snap: SnapSettings, picture: Rect[float]) -> Outcome:
         names = outcome.selection.names
         if self.gizmo.is_using and self._held_by_gizmo != (id(outcome.scene), names):
             self.gizmo.give_up()  # The scene was undone or edited, or the object deselected, under the drag.
-        scene = self.gizmo.draw(outcome.scene, names, tool, snap, picture)
+        has_handle = self._handles.is_over or self._handles.is_held
+        scene = self.gizmo.draw(outcome.scene, names, tool, snap, picture, is_enabled=not has_handle)
         self._held_by_gizmo = id(scene), names
         return outcome.proposed(Proposal(scene, tool.operation.capitalize(), "gizmo"))
 
@@ -310,10 +337,11 @@ class Viewport:
     def _is_free(self, button: Button = Button.LEFT) -> bool:
         """Whether the mouse belongs to the picture: to no panel, no menu, no dialog, and no handle of the
         gizmo, which takes the left button only."""
-        if self.gizmo.is_using or self._is_blocked:
+        if self.gizmo.is_using or self._handles.is_held or self._is_blocked:
             return False
         if button is Button.LEFT:
-            return not (imgui.get_io().want_capture_mouse or self.gizmo.is_over)
+            is_over_handle = self.gizmo.is_over or self._handles.is_over
+            return not (imgui.get_io().want_capture_mouse or is_over_handle)
         # want_capture_mouse does not help here, because a handle of the gizmo under the mouse sets it too.
         is_over_panel = imgui.is_window_hovered(_ANY_WINDOW) or imgui.is_any_item_active()
         return not (is_over_panel or imgui.is_popup_open("", _ANY_POPUP))

@@ -108,7 +108,7 @@ def test_every_command_runs_everywhere(one: Command, where: str, selected: int) 
 
 NEEDS_SELECTION = {
     "Move", "Rotate", "Scale", "Copy", "Duplicate", "Duplicate and move", "Delete", "Rename…", "Hide",
-    "Clear position", "Clear rotation", "Clear scale", "Clear all three",
+    "Clear position", "Clear rotation", "Clear scale", "Clear all three", "Aim light",
 }  # fmt: skip
 NEEDS_PICTURE = {"Export picture…", "Copy picture", "Pin reference"}
 NEEDS_CAMERAS = {"Next camera"}
