@@ -40,8 +40,9 @@ def take_frame(
     _take_outcome(editor, outcome)
     _take_material(editor, picture)
     rendered = picture if editor.region is None else picture.part(editor.region)
-    captions.draw(editor.frame, overlay, editor.preferences.display, rendered)
-    if not editor.has_light:
+    if editor.is_rendered:
+        captions.draw(editor.frame, overlay, editor.preferences.display, rendered)
+    if editor.is_rendered and not editor.has_light:
         captions.draw_darkness(picture)
     editor.settle(viewport.is_held or imgui.is_any_item_active(), viewport.is_flying, viewport.hint)
     return area
@@ -63,6 +64,7 @@ def draw_picture(
         clip_px=area.scaled(scale),
         selection=selection,
         scale=scale,
+        scene=editor.shown,
     )
 
 

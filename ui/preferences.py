@@ -34,9 +34,16 @@ OVERLAYS = (
     "error_left", "touched", "pairs", "weight",
 )  # fmt: skip
 """What may be laid over the picture, in the order of the menu."""
+SHADINGS = ("rendered", "material", "solid")
+"""How the scene is shown: rendered, or shaded by OpenGL with its materials or in plain colours."""
 NAVIGATIONS = ("blender", "plain")
 """Sets of keys and moves of the mouse; see `bindings`."""
-CHOICES: Mapping[str, tuple[str, ...]] = {"curve": CURVES, "overlay": OVERLAYS, "navigation": NAVIGATIONS}
+CHOICES: Mapping[str, tuple[str, ...]] = {
+    "curve": CURVES,
+    "overlay": OVERLAYS,
+    "navigation": NAVIGATIONS,
+    "shading": SHADINGS,
+}
 """The values that a text may have, by name of the field."""
 RANGES: Mapping[str, tuple[float, float]] = {
     "exposure": (-20.0, 20.0),
@@ -120,7 +127,7 @@ class DisplaySettings(_Group):
 
     `exposure` in stops (EV), `curve` one of CURVES, `overlay` one of OVERLAYS at `overlay_opacity`;
     `split_position` is the place of the bar in units of the picture's width. `denoise`: a denoised picture is
-    shown where there is noise.
+    shown where there is noise. `shading` is one of SHADINGS.
     """
 
     exposure: float = 0.0
@@ -132,6 +139,7 @@ class DisplaySettings(_Group):
     split: bool = False
     split_position: float = 0.5
     denoise: bool = False
+    shading: str = "rendered"
 
 
 @dataclass(frozen=True)

@@ -70,6 +70,10 @@ class Workspace:
         status = notices.status_text(
             editor.frame, editor.control.paused, editor.selection, editor.viewing.is_free
         )
+        if not editor.is_rendered:
+            status = notices.shaded_text(
+                editor.preferences.display.shading, editor.selection, editor.viewing.is_free
+            )
         asked = notices.draw_status_bar(editor.gesture.hint or status, editor.rendering.final)
         if asked is not None:
             pictures.end_final(editor, is_kept=asked == "keep")

@@ -23,6 +23,8 @@ _MODIFIERS = {
 """imgui's modifiers, by their names in the table of commands."""
 _KEY_NAMES = {"KeypadDecimal": "keypad_decimal"}
 """imgui's names of keys, where they are not those of the table in lower case."""
+_TITLES = {"add": "Add", "shading": "Shading"}
+"""What stands above the commands of a menu at the mouse; that of the selection says what is selected."""
 _ANY_POPUP = imgui.PopupFlags_.any_popup
 
 
@@ -94,13 +96,14 @@ def _popups() -> dict[str, list[list[Command]]]:
     """Groups of commands of the menus that open at the mouse, by name."""
     return {
         "add": [[one for one in COMMANDS if one.menu == "Object/Add"]],
+        "shading": [[one for one in COMMANDS if one.menu == "View/Shading"]],
         "selection": [[command(name) for name in names] for names in SELECTION_MENU],
     }
 
 
 def _popup_title(editor: Editor, name: str) -> str:
-    if name == "add":
-        return "Add"
+    if name in _TITLES:
+        return _TITLES[name]
     names = editor.selection.names
     return names[0] if len(names) == 1 else f"{len(names)} selected"
 

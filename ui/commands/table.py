@@ -18,7 +18,7 @@ from incpt.ui.commands.command import Action, Command, Test
 from incpt.ui.dialogs.about import About
 from incpt.ui.dialogs.help_page import HelpPage
 from incpt.ui.editor.editor import Editor
-from incpt.ui.panels.display import OVERLAY_TEXTS
+from incpt.ui.panels.display import OVERLAY_TEXTS, SHADING_HELP, SHADING_TEXTS
 from incpt.ui.panels.tool import PIVOTS
 from incpt.ui.preferences import PANELS
 
@@ -77,6 +77,14 @@ def _overlay(name: str) -> Action:
 
 def _shows_overlay(name: str) -> Test:
     return lambda editor: editor.preferences.display.overlay == name
+
+
+def _shade(name: str) -> Action:
+    return lambda editor: editor.change_display(replace(editor.preferences.display, shading=name))
+
+
+def _shades(name: str) -> Test:
+    return lambda editor: editor.preferences.display.shading == name
 
 
 def _navigate(name: str) -> Action:
@@ -249,6 +257,10 @@ COMMANDS: tuple[Command, ...] = (
     Command("Left", "View/Look from", _look_from("left"), "Ctrl+Keypad3"),
     Command("Top", "View/Look from", _look_from("top"), "Keypad7"),
     Command("Bottom", "View/Look from", _look_from("bottom"), "Ctrl+Keypad7"),
+    Command("Shading…", "View", lambda e: e.open_menu("shading"), "Z", group=1,
+            help="How the scene is shown, in a menu at the mouse"),
+    *(Command(text, "View/Shading", _shade(name), checked=_shades(name), group=1, help=SHADING_HELP[name])
+      for name, text in SHADING_TEXTS.items()),
     Command("Split view", "View", _switch_display("split"), "F6", group=1, checked=_displays("split"),
             help="Left: restart, right: the chosen strategy, fed with the same edits"),
     Command("Tile grid", "View", _switch_display("tile_grid"), "F7", group=1, checked=_displays("tile_grid"),

@@ -10,10 +10,12 @@ import moderngl
 
 from incpt.render.first_hits import FirstHits
 from incpt.scene.camera import Camera
+from incpt.scene.model import Scene
 from incpt.ui.display import shaders
 from incpt.ui.display.outline import Outline, Outlined
 from incpt.ui.display.overlays import Overlay
 from incpt.ui.display.projection import split_x, viewport_of, whole_pixels
+from incpt.ui.display.shading import Shading
 from incpt.ui.display.textures import PictureTextures
 from incpt.ui.preferences import DisplaySettings
 from incpt.ui.rect import Rect
@@ -45,6 +47,7 @@ class Display:
         self._programs = (self._tone_map, self._compose, self._bar, self._tile_luma)
         self._arrays = {p: context.vertex_array(p, []) for p in self._programs}
         self.outline = Outline(context)
+        self._shading: Shading | None = None
         self._sides: list[PictureTextures] = []
         self._region: Rect[float] | None = None
         self._camera: Camera | None = None
@@ -116,8 +119,9 @@ class Display:
         clip_px: Rect[float] | None = None,
         selection: Outlined | None = None,
         scale: float = 1.0,
+        scene: Scene | None = None,
     ) -> None:
-        """Draw into the framebuffer that is bound.
+        """Draw into the framebuffer that is bound. `scene` is what is shaded where that is not rendered.
 
         `rect_px` is where the whole image lies in the framebuffer; it may reach beyond it. `clip_px`, by
         default the whole framebuffer, is where drawing is allowed. `scale` is the DPI scale, for lines.
@@ -126,39 +130,60 @@ class Display:
         """
         whole = Rect(0, 0, *framebuffer_size)
         area = whole_pixels(rect_px, clip_px or whole, whole)
-        if not self._sides or area is None:
+        shaded = scene if settings.shading != "rendered" else None
+        if area is None or (not self._sides and shaded is None):
             return
-        rendered = rect_px if self._region is None else rect_px.part(self._region)
         context, target, height = self._context, self._context.fbo, framebuffer_size[1]
         context.enable_only(moderngl.NOTHING)
+        if shaded is not None:
+            self._shading = self._shading or Shading(context)
+            self._shading.draw(target, area, rect_px, height, shaded, settings.shading)
+        else:
+            self._draw_rendered(target, area, rect_px, settings, height, scale)
+        if settings.outline and selection is not None:
+            aspect = self._aspect(selection, shaded is not None)
+            self.outline.draw(target, area, rect_px, height, selection, aspect, scale)
+        context.enable_only(moderngl.NOTHING)
+        context.viewport = (0, 0, *framebuffer_size)
+
+    def _draw_rendered(
+        self,
+        target: moderngl.Framebuffer,
+        area: Rect[int],
+        rect_px: Rect[float],
+        settings: DisplaySettings,
+        framebuffer_height: int,
+        scale: float,
+    ) -> None:
+        """The pictures, and the bar between two."""
+        rendered = rect_px if self._region is None else rect_px.part(self._region)
         is_split = settings.split and len(self._sides) == 2
         bar_x = split_x(rect_px, settings.split_position) if is_split else None
         shown = self._shown(area, rendered, bar_x)
         self._prepare(shown, settings)
         target.use()
-        context.scissor = None
+        self._context.scissor = None
         if self._around is not None:
-            self._draw_side(self._around, area, rect_px, _BARE, height)
+            self._draw_side(self._around, area, rect_px, _BARE, framebuffer_height)
         for side, part in shown:
-            self._draw_side(side, part, rendered, settings, height)
-        if settings.outline and selection is not None:
-            self.outline.draw(target, area, rect_px, height, selection, self._aspect(selection), scale)
+            self._draw_side(side, part, rendered, settings, framebuffer_height)
         if bar_x is not None:
-            self._draw_bar(bar_x, area, rect_px, height, scale)
-        context.enable_only(moderngl.NOTHING)
-        context.viewport = (0, 0, *framebuffer_size)
+            self._draw_bar(bar_x, area, rect_px, framebuffer_height, scale)
+            self._context.disable(moderngl.BLEND)
 
     def release(self) -> None:
         """Give all GL objects back."""
         self.forget()
         self.outline.release()
+        if self._shading is not None:
+            self._shading.release()
         for array in self._arrays.values():
             array.release()
         for program in self._programs:
             program.release()
 
-    def _aspect(self, selection: Outlined) -> float:
-        if self._region is None:
+    def _aspect(self, selection: Outlined, is_shaded: bool) -> float:
+        if self._region is None and not is_shaded:
             return self._sides[-1].aspect
         width, height = selection.scene.settings.size
         return width / height

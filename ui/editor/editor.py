@@ -264,8 +264,14 @@ class Editor:
     @property
     def region(self) -> Rect[float] | None:
         """The part of the picture that alone is rendered, in units of it; None: all of it is. A split view
-        shows all of it."""
-        return None if self.preferences.display.split else self.viewing.region
+        and shading show all of it."""
+        is_whole = self.preferences.display.split or not self.is_rendered
+        return None if is_whole else self.viewing.region
+
+    @property
+    def is_rendered(self) -> bool:
+        """Whether the rendered picture is shown, and not the scene shaded by OpenGL."""
+        return self.preferences.display.shading == "rendered"
 
     def _in_region(self, point: Point) -> Point:
         """A point of the picture in units of what is rendered of it."""
@@ -305,12 +311,13 @@ class Editor:
             before=None if before is None else self._shown.region(before, region),
             point=self.control.point,
             resolution_scale=self.preferences.resolution_scale,
-            paused=self.control.paused,
+            # While the scene is shaded the device rests, but for what waits for the whole picture.
+            paused=self.control.paused or not (self.is_rendered or self.rendering.waiting),
             target_spp=self.control.target_spp,
             step_ms=self.preferences.step_ms,
             drag_nor=self.preferences.drag_nor,
             split=display.split,
-            first_hits=display.overlay in NEEDS_FIRST_HITS,
+            first_hits=display.overlay in NEEDS_FIRST_HITS and self.is_rendered,
             denoise=display.denoise and denoise.is_available(),
             region=None if region is None else (region.left, region.top, region.width, region.height),
         )

@@ -26,6 +26,17 @@ OVERLAY_TEXTS = {
     "weight": "Weight of the old picture",
 }
 """How panel and menu name the overlays, in the order of the menu."""
+SHADING_TEXTS = {"rendered": "Rendered", "material": "Material preview", "solid": "Solid"}
+"""How panel and menu name the kinds of shading."""
+SHADING_HELP = {
+    "rendered": "By the path tracer",
+    "material": "By OpenGL: textures, roughness and metal in a studio that moves with the camera",
+    "solid": "By OpenGL: every object in the plain colour of its material",
+}
+"""What each kind is."""
+_SHADING_TIP = (
+    "By OpenGL, without shadows and the scene's light, the device rests: for editing where it is slow"
+)
 _DENOISE_TIP = (
     "For the eye alone: what is rendered stays as it is. Where little noise is left, nothing is denoised"
 )
@@ -33,6 +44,7 @@ _DENOISE_TIP = (
 
 def draw(display: DisplaySettings, refusals: Refusals) -> DisplaySettings:
     """Fields of the display settings; returns them after this frame."""
+    shading = widgets.choice("Shading", display.shading, list(SHADING_TEXTS.items()), _SHADING_TIP)
     exposure = widgets.number(
         "Exposure", display.exposure, low=-10.0, high=10.0, speed=0.02, unit=" EV", decimals=2
     )
@@ -48,6 +60,7 @@ def draw(display: DisplaySettings, refusals: Refusals) -> DisplaySettings:
     split = widgets.checkbox("Split view", display.split, "Left: restart, right: the chosen strategy")
     return refusals.changed(
         display,
+        shading=shading,
         exposure=exposure,
         curve=curve,
         overlay=overlay,

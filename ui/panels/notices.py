@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 
 from incpt.scene.selection import Selection
 from incpt.ui.editor.notices import Notice
+from incpt.ui.panels.display import SHADING_TEXTS
 from incpt.ui.panels.render import MODE_TEXTS, found_text
 from incpt.ui.rect import Rect
 from incpt.ui.widgets import icons, places, theme, widgets
@@ -98,12 +99,20 @@ def status_text(
         parts.append(_samples_text(picture, found is not None) + _denoised_text(picture))
         if picture.error is not None:
             parts.append(f"RMSE {picture.error:.5f}" + (" to a stale reference" if frame.is_stale else ""))
+    return "   |   ".join([*parts, *_selection_text(selection)])
+
+
+def shaded_text(shading: str, selection: Selection, is_free_view: bool) -> str:
+    """The same while the scene is shaded and not rendered."""
+    parts = [*(["Free view"] if is_free_view else []), f"{SHADING_TEXTS[shading]}, not rendered"]
+    return "   |   ".join([*parts, *_selection_text(selection)])
+
+
+def _selection_text(selection: Selection) -> list[str]:
     names = selection.names
-    if len(names) == 1:
-        parts.append(names[0])
-    elif names:
-        parts.append(f"{len(names)} objects selected")
-    return "   |   ".join(parts)
+    if len(names) < 2:
+        return list(names)
+    return [f"{len(names)} objects selected"]
 
 
 def _samples_text(picture: Picture, is_finding: bool) -> str:

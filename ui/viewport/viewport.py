@@ -245,7 +245,7 @@ class Viewport:
     # -------------------------------------------------------------------------------- the split's bar
 
     def _use_bar(self, outcome: Outcome, picture: Rect[float]) -> Outcome:
-        if not outcome.display.split:
+        if not outcome.display.split or outcome.display.shading != "rendered":
             self._holds_bar = False
             return outcome
         mouse = _mouse()

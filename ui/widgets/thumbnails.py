@@ -110,7 +110,7 @@ def reduced(pixels: npt.NDArray[Any], side: int) -> npt.NDArray[np.uint8]:
     squares where it is transparent."""
     height, width = pixels.shape[:2]
     step = max(max(width, height) // (_OVERSIZE * side), 1)
-    shown = _as_shown(pixels[::step, ::step])
+    shown = as_shown(pixels[::step, ::step])
     channels = shown.shape[2]
     color = np.repeat(shown[..., :1], 3, axis=2) if channels < 3 else shown[..., :3]
     if channels in (2, 4):
@@ -122,7 +122,7 @@ def reduced(pixels: npt.NDArray[Any], side: int) -> npt.NDArray[np.uint8]:
     return np.dstack([small, np.full(small.shape[:2], 255, np.uint8)])
 
 
-def _as_shown(pixels: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+def as_shown(pixels: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
     """Values from 0 to 1 as a display has them."""
     if pixels.dtype == np.float32:
         # Alpha is no light.

@@ -166,6 +166,7 @@ CHOICES = [
     ("Render", "Strategy", "Restart", "restart", "scene.settings.strategy"),
     ("Render", "Strategy", "Impact", "impact", "scene.settings.strategy"),
     ("Render", "Tile size", "32 × 32", 32, "scene.settings.tile_size"),
+    ("Method", "Shading", "Solid", "solid", "preferences.display.shading"),
     ("Method", "Curve", "Filmic", "filmic", "preferences.display.curve"),
     ("Method", "Overlay", "Normals", "normals", "preferences.display.overlay"),
 ]
