@@ -189,6 +189,9 @@ def test_the_least_turn_is_taken_also_where_it_is_turned_round() -> None:
     assert placing.aimed(light, (1, -5, 3)) == light and placing.aimed(light, light.position) == light
     up = placing.aimed(light, (1, 9, 3))
     np.testing.assert_allclose(up.axes[2], (0, -1, 0), atol=1e-9)
+    plain = Light("l", "spot", (0, 0, 0))
+    assert placing.aimed(plain, (0, 0, -3)) == plain
+    np.testing.assert_allclose(placing.aimed(plain, (0, 0, 5)).axes[2], (0, 0, -1), atol=1e-9)
     side = placing.aimed(light, (9, 2, 3))
     np.testing.assert_allclose(side.axes[2], (-1, 0, 0), atol=1e-9)
     assert side.position == light.position and side.scale == light.scale
