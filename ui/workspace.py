@@ -13,7 +13,7 @@ from incpt.render.strategies import strategy_of
 from incpt.scene import edits, several
 from incpt.scene.light import Light
 from incpt.scene.model import Object, Placed
-from incpt.ui.commands import camera, command, files, materials, menus, objects, pictures, rendering
+from incpt.ui.commands import camera, command, files, materials, menus, objects, pictures, rendering, views
 from incpt.ui.editor.editor import Editor
 from incpt.ui.editor.records import Records
 from incpt.ui.layout import Layout
@@ -26,6 +26,7 @@ from incpt.ui.panels import materials as materials_panel
 from incpt.ui.panels import name as name_panel
 from incpt.ui.panels import notices, outliner, plots, render, tool, transform
 from incpt.ui.panels import textures as textures_panel
+from incpt.ui.panels import views as views_panel
 from incpt.ui.panels.materials import MaterialsState
 from incpt.ui.panels.outliner import OutlinerState
 from incpt.ui.preferences import PANELS
@@ -42,7 +43,6 @@ class Workspace:
         self.records = Records()
         self._outliner = OutlinerState()
         self._materials = MaterialsState()
-        self._is_uniform = True
         self._devices: list[str] | None = None
         self._thumbnails = Thumbnails()
         self._layout = Layout()
@@ -60,6 +60,8 @@ class Workspace:
         area = self._layout.keep() if is_alone else self._draw_around(editor)
         _draw_notices(editor, area)
         _draw_dialog(editor)
+        for remark in widgets.take_remarks():
+            editor.say(remark, "warning")
         pressed = menus.pressed_command(editor)
         if pressed is not None:
             command.run(editor, pressed)
@@ -152,9 +154,10 @@ class Workspace:
         _tell(editor, refusals)
 
     def _draw_transform(self, editor: Editor, one: Placed, refusals: Refusals) -> None:
-        is_uniform, others = self._is_uniform, _others(editor)
+        is_uniform, others = editor.tool.is_uniform, _others(editor)
         with mixed.marking(lambda placed: transform.draw(placed, is_uniform, Refusals()), one, others):
-            new, self._is_uniform = transform.draw(one, is_uniform, refusals)
+            new, is_uniform = transform.draw(one, is_uniform, refusals)
+        editor.tool = replace(editor.tool, is_uniform=is_uniform)
         given = [transform.COMPONENTS[label] for label in mixed.given()]
         if new is one and not given:
             return
@@ -216,23 +219,13 @@ class Workspace:
 
     def _draw_scene(self, editor: Editor) -> None:
         refusals = Refusals()
-        scene = editor.scene
         with widgets.section("Camera") as is_open:
             if is_open:
-                chosen = camera_panel.draw_choice(
-                    tuple(scene.cameras), scene.camera_name, editor.viewing.is_free, editor.viewing.is_locked
-                )
-                width, height = scene.settings.size
-                new, wanted = camera_panel.draw(scene.camera, width / height, refusals)
-                if new is not scene.camera:
-                    editor.propose(replace(scene, camera=new), "Camera", _key())
-                if wanted.is_focus:
-                    camera.focus_selected(editor)
-                if wanted.is_frame:
-                    camera.frame_selected(editor)
-                if wanted.is_reset:
-                    camera.reset_camera(editor)
-                editor.attempt(lambda: _apply_camera_outcome(editor, chosen))
+                _draw_camera(editor, refusals)
+        with widgets.section("Views", is_open=bool(editor.viewing.saved)) as is_open:
+            if is_open:
+                asked_view = views_panel.draw(tuple(editor.viewing.saved), editor.viewing.last_saved)
+                editor.attempt(lambda: _apply_view_outcome(editor, asked_view))
         scene = editor.scene
         with widgets.section("Environment") as is_open:
             if is_open:
@@ -287,6 +280,24 @@ class Workspace:
                 if asked.is_again:
                     rendering.pin_again(editor)
                 plots.draw(self.records, editor.preferences.step_ms)
+
+
+def _draw_camera(editor: Editor, refusals: Refusals) -> None:
+    scene = editor.scene
+    chosen = camera_panel.draw_choice(
+        tuple(scene.cameras), scene.camera_name, editor.viewing.is_free, editor.viewing.is_locked
+    )
+    width, height = scene.settings.size
+    new, wanted = camera_panel.draw(scene.camera, width / height, refusals)
+    if new is not scene.camera:
+        editor.propose(replace(scene, camera=new), "Camera", _key())
+    if wanted.is_focus:
+        camera.focus_selected(editor)
+    if wanted.is_frame:
+        camera.frame_selected(editor)
+    if wanted.is_reset:
+        camera.reset_camera(editor)
+    editor.attempt(lambda: _apply_camera_outcome(editor, chosen))
 
 
 def _draw_light(editor: Editor, name: str, refusals: Refusals) -> None:
@@ -359,6 +370,17 @@ def _apply_camera_outcome(editor: Editor, outcome: camera_panel.Outcome) -> None
         camera.rename_camera(editor)
     if outcome.is_delete:
         camera.delete_camera(editor)
+
+
+def _apply_view_outcome(editor: Editor, outcome: views_panel.Outcome) -> None:
+    if outcome.go is not None:
+        views.go(editor, outcome.go)
+    if outcome.is_save:
+        views.save(editor)
+    if outcome.is_rename:
+        views.rename(editor)
+    if outcome.is_delete:
+        views.delete(editor)
 
 
 def _apply_material_outcome(editor: Editor, material: str, outcome: material_panel.Outcome) -> None:

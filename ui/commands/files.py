@@ -18,6 +18,7 @@ from incpt.formats.relink import MissingFile
 from incpt.scene.material import texture_name
 from incpt.scene.selection import Selection
 from incpt.scene.texture import Texture
+from incpt.ui import saved_views
 from incpt.ui.dialogs.native import FileFilter
 from incpt.ui.dialogs.path_dialog import PathDialog
 from incpt.ui.dialogs.question import Choice, Question
@@ -84,6 +85,8 @@ def save_to(editor: Editor, path: Path) -> None:
     """Write the scene file there, and say so."""
     written = editor.document.save(path)
     editor.preferences = editor.preferences.with_recent(written)
+    if editor.viewing.saved:
+        saved_views.keep(written, editor.viewing.saved)
     told = "; this view is no part of it, unless View › Camera to view" if editor.viewing.is_free else ""
     editor.say(f"{written} is saved{told}", "done")
 

@@ -13,7 +13,7 @@ from typing import Any
 from incpt.picture import denoise
 from incpt.scene.edits import LIGHT_NAMES
 from incpt.scene.shapes import SHAPES
-from incpt.ui.commands import camera, files, materials, objects, pictures, rendering, window
+from incpt.ui.commands import camera, files, materials, objects, pictures, rendering, views, window
 from incpt.ui.commands.command import Action, Command, Test
 from incpt.ui.dialogs.about import About
 from incpt.ui.dialogs.help_page import HelpPage
@@ -251,6 +251,9 @@ COMMANDS: tuple[Command, ...] = (
             help="Moves of the view through the active camera move that camera, and can be undone"),
     Command("Next camera", "View", camera.next_camera, "Ctrl+Keypad0",
             enabled=lambda e: len(e.scene.cameras) > 1, help="See the scene through the next of its cameras"),
+    Command("Save view", "View", views.save, "Ctrl+Shift+B", help="Keep the view as it is, under a name"),
+    Command("Next saved view", "View", views.go_to_next, "Shift+B", enabled=views.has_saved,
+            help="Look as the next of the saved views does"),
     Command("Front", "View/Look from", _look_from("front"), "Keypad1"),
     Command("Back", "View/Look from", _look_from("back"), "Ctrl+Keypad1"),
     Command("Right", "View/Look from", _look_from("right"), "Keypad3"),

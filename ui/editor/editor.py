@@ -23,6 +23,7 @@ from incpt.scene.edits import Copied
 from incpt.scene.light import DIRECTED
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
+from incpt.ui import saved_views
 from incpt.ui.display.overlays import NEEDS_FIRST_HITS
 from incpt.ui.editor import clipboard, job
 from incpt.ui.editor.dialog import Answer, Dialog
@@ -449,7 +450,7 @@ class Editor:
     def start_over(self, document: Document, opened: Path | None = None) -> None:
         """Edit another document from now on."""
         self.document = document
-        self.viewing = Viewing(is_locked=self.viewing.is_locked)
+        self.viewing = Viewing(is_locked=self.viewing.is_locked, saved=saved_views.of_scene(document.path))
         self._before_move = None
         self.select(Selection())
         self.control = replace(self.control, point=None)

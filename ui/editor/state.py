@@ -16,11 +16,13 @@ class Tool:
     space       along which axes: world or local.
     pivot       about which point several are turned and scaled: median (the mean of their positions), active
                 (that of the active one) or individual (each about its own).
+    is_uniform  whether fields and handles scale all three axes alike. S does, unless it is held along one.
     """
 
     operation: str = "move"
     space: str = "world"
     pivot: str = "median"
+    is_uniform: bool = True
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 from incpt.scene import camera_moves
 from incpt.scene.camera import Camera
@@ -32,12 +33,15 @@ class Viewing:
     left        the free view that was left last, to which `switched` goes back.
     is_locked   whether moves of the view through the active camera move that camera, which are edits then.
     region      the part of the picture that alone is rendered, in units of it; None: all of it is.
+    saved       cameras of views that were saved, by name; `last_saved` is the one that was gone to last.
     """
 
     camera: Camera | None = None
     left: Camera | None = None
     is_locked: bool = False
     region: Rect[float] | None = None
+    saved: Mapping[str, Camera] = field(default_factory=dict)
+    last_saved: str | None = None
 
     @property
     def is_free(self) -> bool:

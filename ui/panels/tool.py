@@ -30,7 +30,7 @@ def draw(tool: Tool, snap: SnapSettings, refusals: Refusals) -> tuple[Tool, Snap
         rotate_deg = _step("Step of turns", "rotate_deg", snap.rotate_deg, 0.5, "°")
         scale = _step("Step of scale", "scale", snap.scale, 0.01, "")
         snap = refusals.changed(snap, move_m=move_m, rotate_deg=rotate_deg, scale=scale)
-    return Tool(operation, space, pivot), snap
+    return replace(tool, operation=operation, space=space, pivot=pivot), snap
 
 
 def _step(label: str, name: str, value: float, speed: float, unit: str) -> float:

@@ -33,7 +33,9 @@ def draw(obj: T, is_uniform: bool, refusals: Refusals) -> tuple[T, bool]:
     scale = widgets.vector("Scale", obj.scale, speed=0.01, tip="Factor along the object's own axes")
     scale = proportional(obj.scale, scale) if is_uniform else scale
     obj = refusals.changed(obj, scale=scale)
-    is_uniform = widgets.checkbox("Uniform scale", is_uniform, "One field of the scale changes all three")
+    is_uniform = widgets.checkbox(
+        "Uniform scale", is_uniform, "One field or handle of the scale changes all three"
+    )
     return _reset_buttons(obj), is_uniform
 
 

@@ -106,6 +106,8 @@ class Gizmo:
             return scene
         if self._drag is None:
             self._drag = _Drag(scene, old, old)
+        if tool.operation == "scale" and tool.is_uniform:
+            new = _alike(self._drag.start, new)
         if np.array_equal(new, self._drag.matrix) or not np.isfinite(new).all():
             return scene
         self._drag.matrix = new
@@ -131,6 +133,14 @@ def handles(scene: Scene, names: tuple[str, ...], tool: Tool) -> Matrix:
             matrix[:3, :3] = affine.rotation_matrix(active.rotation)
         matrix[:3, 3] = pivot.shared_point(scene, names, tool.pivot)
     return matrix
+
+
+def _alike(start: Matrix, scaled: Matrix) -> Matrix:
+    """(4, 4) `start` with all three axes scaled by the factor of the one that `scaled` scales most."""
+    factors = np.linalg.norm(scaled[:3, :3], axis=0) / np.linalg.norm(start[:3, :3], axis=0)
+    alike = start.copy()
+    alike[:3, :3] *= factors[np.argmax(np.abs(np.log(np.maximum(factors, 1e-9))))]
+    return alike
 
 
 def view_matrix(camera: Camera) -> Matrix:

@@ -24,6 +24,8 @@ _edited = [0]
 """imgui's number of the widget whose value changed last; a list of one, so that functions can set it."""
 _edited_label = [""]
 """The label of that widget."""
+_remarks: list[str] = []
+"""What fields have to say of what was typed into them, until somebody takes it."""
 
 
 @contextmanager
@@ -77,17 +79,22 @@ def whole_number(
     enabled: bool = True,
     why_not: str = "",
 ) -> int:
-    """A whole number to drag or to type, held between `low` and `high`. Where it is not `enabled`, the tip
-    says `why_not`."""
+    """A whole number to drag or to type, held between `low` and `high`, which is said of a number that was
+    typed beyond them. Where it is not `enabled`, the tip says `why_not`."""
     if mixed.is_told(label, value):
         return value
     with row(label, tip if enabled else f"{tip}. {why_not}") as field:
         # A file may hold numbers beyond the bounds of the widget, or beyond imgui's 32 bits.
         shown = min(max(value, -(1 << 31)), (1 << 31) - 1)
-        flags = imgui.SliderFlags_.always_clamp
         imgui.begin_disabled(not enabled)
-        changed, result = imgui.drag_int(field, shown, speed, low, high, _form(label, None), flags)
+        changed, typed = imgui.drag_int(field, shown, speed, low, high, _form(label, None))
         imgui.end_disabled()
+        result = min(max(typed, low), high)
+        # A file may hold numbers beyond the bounds, which nobody has typed.
+        if changed and result != typed:
+            _remarks.append(
+                f"{label}: {typed:,} is out of range; {result:,} is taken, of {low:,} to {high:,}"
+            )
         _note(label, changed)
         if not enabled and imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
             imgui.set_tooltip(why_not)
@@ -257,6 +264,13 @@ def note(message: str, color: theme.Rgba = theme.QUIET) -> None:
     imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*color))
     imgui.text_wrapped(message)
     imgui.pop_style_color()
+
+
+def take_remarks() -> list[str]:
+    """What fields have said since the last call: which numbers were held within their bounds."""
+    said = list(_remarks)
+    _remarks.clear()
+    return said
 
 
 def edited() -> int:

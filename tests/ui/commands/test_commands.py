@@ -113,7 +113,7 @@ NEEDS_SELECTION = {
 NEEDS_PICTURE = {"Export picture…", "Copy picture", "Pin reference"}
 NEEDS_CAMERAS = {"Next camera"}
 NEEDS_LOSS = "Find missing files…"
-NEEDS_VIEW = {"Through the camera", "Camera to view", "Clear region"}
+NEEDS_VIEW = {"Through the camera", "Camera to view", "Clear region", "Next saved view"}
 
 
 def test_what_is_disabled(user: Desk) -> None:

@@ -198,6 +198,7 @@ BUTTONS = [
 ]
 
 SECTIONS = {
+    "Views",
     "Transform",
     "Gizmo",
     "Material",
@@ -256,7 +257,7 @@ def turn_to(user: Desk, panel: str, selected: str = "red cube") -> None:
         for section, field in (("Transmission", "Priority"), ("Emission", "Double sided")):
             if not user.shows(field):
                 user.click(section)
-        if user.shows("Uniform scale") and user.workspace._is_uniform:
+        if user.shows("Uniform scale") and user.editor.tool.is_uniform:
             user.click("Uniform scale")
 
 
@@ -392,7 +393,8 @@ def test_settings_stay_in_their_range(user: Desk, field: Field, typed: str) -> N
     changed = changes(before, state(user.editor))
     if before[field.place] is None or isinstance(before[field.place], int):
         # Brought into its range: scene and preferences refuse to be made with another value.
-        assert changed <= {field.place}
+        # What is beyond the bounds of the field is said.
+        assert changed <= {field.place, "notices"}
     else:
         assert changed == {"notices"}
 
@@ -790,3 +792,14 @@ def test_without_a_denoiser_a_line_says_how_to_get_one(user: Desk, monkeypatch: 
     user.click("Denoise")
     assert not user.editor.preferences.display.denoise
     assert 'pip install "incpt[denoise]"' in user.editor.notices.said[-1].text
+
+
+def test_a_number_that_is_held_within_its_bounds_says_so(user: Desk) -> None:
+    turn_to(user, "Render", "red cube")
+    user.type("Bounces", "5000")
+    assert user.scene.settings.max_bounces == 200
+    assert user.texts() == ["Bounces: 5,000 is out of range; 200 is taken, of 0 to 200"]
+    user.type("Bounces", "7")
+    assert user.scene.settings.max_bounces == 7 and len(user.texts()) == 1
+    user.drag("Bounces", -3000)
+    assert user.scene.settings.max_bounces == 0 and len(user.texts()) == 1, "a drag ends there"

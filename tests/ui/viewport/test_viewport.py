@@ -417,3 +417,23 @@ def test_a_hand_that_rests_changes_nothing(user: Desk) -> None:
     )
     user.end()
     assert outcome == Outcome(editor.scene, editor.selection, editor.preferences.display)
+
+
+def test_handles_and_fields_agree_about_uniform_scale() -> None:
+    front = replace(SCENE.with_object("red cube", rotation=(0, 0, 0), scale=(1, 2, 1)),
+                    camera=Camera((0, 0.5, 5), (0, 0.5, 0)))  # fmt: skip
+    with desk(front) as user:
+        user.editor.select(Selection(("red cube",)))
+        user.run("Scale handles")
+        x, y = user.place("gizmo")
+        for is_uniform, expected in ((True, (1, 2, 1)), (False, (1, 0, 0))):
+            user.editor.tool = replace(user.editor.tool, is_uniform=is_uniform)
+            start = 80.0
+            while user.scene is front and start < 400:
+                user.drag_at((x + start, y), (30.0, 0.0))
+                start += 10
+            grown = np.subtract(user.scene.object("red cube").scale, (1, 2, 1))
+            assert grown[0] > 0.05
+            np.testing.assert_allclose(grown, grown[0] * np.array(expected), atol=1e-4)
+            assert user.undo_count == 1
+            user.key("Ctrl+Z")
