@@ -22,7 +22,8 @@ SHIFT, CTRL, ALT = "shift", "ctrl", "alt"
 
 
 _PRINTED = {
-    CTRL: "Ctrl", SHIFT: "Shift", ALT: "Alt", "KeypadDecimal": "Numpad .", "Comma": ",", "Escape": "Esc",
+    CTRL: "Ctrl", SHIFT: "Shift", ALT: "Alt", "KeypadDecimal": "Numpad .", "KeypadDivide": "Numpad /",
+    "Comma": ",", "Slash": "/", "Escape": "Esc",
     **{f"Keypad{digit}": f"Numpad {digit}" for digit in range(10)},
 }  # fmt: skip
 """What is printed on keys, by their names in the tables where these differ."""

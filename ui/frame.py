@@ -64,7 +64,7 @@ def draw_picture(
         clip_px=area.scaled(scale),
         selection=selection,
         scale=scale,
-        scene=editor.shown,
+        scene=editor.seen,
     )
 
 

@@ -127,7 +127,8 @@ class DisplaySettings(_Group):
 
     `exposure` in stops (EV), `curve` one of CURVES, `overlay` one of OVERLAYS at `overlay_opacity`;
     `split_position` is the place of the bar in units of the picture's width. `denoise`: a denoised picture is
-    shown where there is noise. `shading` is one of SHADINGS.
+    shown where there is noise. `shading` is one of SHADINGS. `floor_grid` and `axes`: whether a grid on the
+    floor and the axes of the world are drawn over the picture.
     """
 
     exposure: float = 0.0
@@ -140,6 +141,8 @@ class DisplaySettings(_Group):
     split_position: float = 0.5
     denoise: bool = False
     shading: str = "rendered"
+    floor_grid: bool = False
+    axes: bool = True
 
 
 @dataclass(frozen=True)

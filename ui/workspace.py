@@ -76,6 +76,8 @@ class Workspace:
             status = notices.shaded_text(
                 editor.preferences.display.shading, editor.selection, editor.viewing.is_free
             )
+        if editor.viewing.local is not None:
+            status = f"Local view   |   {status}"
         asked = notices.draw_status_bar(editor.gesture.hint or status, editor.rendering.final)
         if asked is not None:
             pictures.end_final(editor, is_kept=asked == "keep")

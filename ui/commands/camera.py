@@ -31,6 +31,12 @@ def switch_view(editor: Editor) -> None:
     editor.viewing = editor.viewing.switched()
 
 
+def switch_local(editor: Editor) -> None:
+    """See the selected objects alone, or all again."""
+    local = None if editor.viewing.local is not None else frozenset(editor.selection.names)
+    editor.viewing = replace(editor.viewing, local=local)
+
+
 def camera_to_view(editor: Editor) -> None:
     """Put the active camera where the free view is."""
     camera = editor.shown.camera

@@ -21,7 +21,7 @@ _MODIFIERS = {
     "Alt": imgui.Key.mod_alt,
 }
 """imgui's modifiers, by their names in the table of commands."""
-_KEY_NAMES = {"KeypadDecimal": "keypad_decimal"}
+_KEY_NAMES = {"KeypadDecimal": "keypad_decimal", "KeypadDivide": "keypad_divide"}
 """imgui's names of keys, where they are not those of the table in lower case."""
 _TITLES = {"add": "Add", "shading": "Shading"}
 """What stands above the commands of a menu at the mouse; that of the selection says what is selected."""

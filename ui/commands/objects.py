@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from incpt.scene import edits
+from incpt.scene import arranging, edits
 from incpt.scene.light import DIRECTED
 from incpt.scene.selection import Selection
 from incpt.scene.transform import IDENTITY
@@ -108,6 +108,23 @@ def rename_to(editor: Editor, old: str, new_name: str) -> None:
 def hide(editor: Editor) -> None:
     """Hide the selected objects."""
     editor.propose(edits.set_visible(editor.scene, editor.selection.names, False), "Hide")
+
+
+def hide_unselected(editor: Editor) -> None:
+    """Hide all but the selected objects and lights."""
+    others = tuple(name for name in editor.scene.names if name not in editor.selection)
+    editor.propose(edits.set_visible(editor.scene, others, False), "Hide unselected")
+
+
+def drop(editor: Editor) -> None:
+    """Each of the selected onto what is below it."""
+    editor.propose(arranging.dropped(editor.scene, editor.selection.names), "Drop to the floor")
+
+
+def align(editor: Editor, axis: int, end: str) -> None:
+    """The selected in line with the active one; see `arranging.aligned`."""
+    *others, active = editor.selection.names
+    editor.propose(arranging.aligned(editor.scene, others, active, axis, end), "Align")
 
 
 def show_all(editor: Editor) -> None:

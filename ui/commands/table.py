@@ -11,6 +11,7 @@ from importlib.metadata import version
 from typing import Any
 
 from incpt.picture import denoise
+from incpt.scene.arranging import ENDS
 from incpt.scene.edits import LIGHT_NAMES
 from incpt.scene.shapes import SHAPES
 from incpt.ui.commands import camera, files, materials, objects, pictures, rendering, views, window
@@ -105,6 +106,14 @@ def _add_light(kind: str) -> Action:
 
 def _begin(action: str, label: str) -> Action:
     return lambda editor: editor.begin(action, label)
+
+
+def _align(axis: int, end: str) -> Action:
+    return lambda editor: objects.align(editor, axis, end)
+
+
+def _several(editor: Editor) -> bool:
+    return len(editor.selection) > 1
 
 
 def _clear(part: str) -> Action:
@@ -222,8 +231,15 @@ COMMANDS: tuple[Command, ...] = (
     Command("Rename…", "Object", objects.rename, "F2", enabled=_selected, group=1, help="Give another name"),
     Command("Hide", "Object", objects.hide, "H", enabled=_selected, group=2,
             help="Hide the selected objects"),
+    Command("Hide unselected", "Object", objects.hide_unselected, "Shift+H", plain_keys="", enabled=_selected,
+            group=2, help="Hide all objects and lights but the selected ones"),
     Command("Show all", "Object", objects.show_all, "Alt+H", plain_keys="Shift+H", group=2,
             help="Show hidden objects again"),
+    Command("Drop to the floor", "Object", objects.drop, "End", enabled=_selected, group=1,
+            help="Each of the selected stands on what is below its middle, or on the floor y = 0"),
+    *(Command(f"{end.capitalize()} {axis}", "Object/Align", _align(i, end), enabled=_several, group=1,
+              help=f"The {end} {axis} of the selected becomes that of the active one")
+      for i, axis in enumerate("XYZ") for end in ENDS),
     Command("Delete unused materials", "Object", materials.purge, group=2,
             help="Those that no object has"),
     Command("Clear position", "Object/Clear", _clear("position"), "Alt+G", enabled=_selected, group=3,
@@ -254,6 +270,10 @@ COMMANDS: tuple[Command, ...] = (
     Command("Save view", "View", views.save, "Ctrl+Shift+B", help="Keep the view as it is, under a name"),
     Command("Next saved view", "View", views.go_to_next, "Shift+B", enabled=views.has_saved,
             help="Look as the next of the saved views does"),
+    Command("Local view", "View", camera.switch_local, "KeypadDivide, Slash",
+            checked=lambda e: e.viewing.local is not None,
+            enabled=lambda e: e.viewing.local is not None or bool(e.selection),
+            help="See the selected objects alone, with what shines; no edit"),
     Command("Front", "View/Look from", _look_from("front"), "Keypad1"),
     Command("Back", "View/Look from", _look_from("back"), "Ctrl+Keypad1"),
     Command("Right", "View/Look from", _look_from("right"), "Keypad3"),
@@ -270,6 +290,10 @@ COMMANDS: tuple[Command, ...] = (
             help="Lines between tiles"),
     Command("Outline", "View", _switch_display("outline"), "F8", group=1, checked=_displays("outline"),
             help="Outline around the selection"),
+    Command("Floor grid", "View", _switch_display("floor_grid"), group=1, checked=_displays("floor_grid"),
+            help="Lines on the floor y = 0"),
+    Command("Axes", "View", _switch_display("axes"), group=1, checked=_displays("axes"),
+            help="Those of the world, in the corner of the picture; a click looks along one"),
     Command("Denoise", "View", _switch_denoise, "F4", group=1, checked=_displays("denoise"),
             help="Show the picture without its noise; what is rendered stays as it is"),
     *(Command(text, "View/Overlay", _overlay(name), checked=_shows_overlay(name), group=1)

@@ -103,6 +103,11 @@ class Editor:
         return self._shown.of(self.scene, self.viewing.camera)
 
     @property
+    def seen(self) -> Scene:
+        """The scene as it is looked at, without what a local view leaves out."""
+        return self._shown.rendered(self.shown, None, self.viewing.local)
+
+    @property
     def has_light(self) -> bool:
         """Whether anything shines in the scene."""
         if self._lit is None or self._lit[0] is not self.scene:
@@ -308,8 +313,8 @@ class Editor:
         """What the renderer is to show."""
         display, region, before = self.preferences.display, self.region, self._shown_before
         return View(
-            scene=self._shown.region(self.shown, region),
-            before=None if before is None else self._shown.region(before, region),
+            scene=self._shown.rendered(self.shown, region, self.viewing.local),
+            before=None if before is None else self._shown.rendered(before, region, self.viewing.local),
             point=self.control.point,
             resolution_scale=self.preferences.resolution_scale,
             # While the scene is shaded the device rests, but for what waits for the whole picture.

@@ -14,9 +14,9 @@ from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from incpt.scene import camera_moves
+from incpt.scene import camera_moves, edits
 from incpt.scene.camera import Camera
-from incpt.scene.model import Scene
+from incpt.scene.model import Object, Scene
 from incpt.ui.rect import Rect
 
 _MOST_KNOWN = 8
@@ -33,6 +33,7 @@ class Viewing:
     left        the free view that was left last, to which `switched` goes back.
     is_locked   whether moves of the view through the active camera move that camera, which are edits then.
     region      the part of the picture that alone is rendered, in units of it; None: all of it is.
+    local       the names of the objects that alone are seen, beside what shines; None: all are.
     saved       cameras of views that were saved, by name; `last_saved` is the one that was gone to last.
     """
 
@@ -40,6 +41,7 @@ class Viewing:
     left: Camera | None = None
     is_locked: bool = False
     region: Rect[float] | None = None
+    local: frozenset[str] | None = None
     saved: Mapping[str, Camera] = field(default_factory=dict)
     last_saved: str | None = None
 
@@ -66,7 +68,10 @@ class ShownScenes:
 
     def __init__(self) -> None:
         self._known: OrderedDict[tuple[int, int], tuple[Scene, Camera, Scene]] = OrderedDict()
-        self._cropped: OrderedDict[tuple[int, Rect[float]], tuple[Scene, Scene]] = OrderedDict()
+        self._rendered: OrderedDict[
+            tuple[int, Rect[float] | None, frozenset[str] | None], tuple[Scene, Scene]
+        ]
+        self._rendered = OrderedDict()
 
     def of(self, scene: Scene, camera: Camera | None) -> Scene:
         """`scene` as it is shown by a view's camera, or through its own (None)."""
@@ -78,17 +83,19 @@ class ShownScenes:
         self._known.move_to_end(key)
         return self._known[key][2]
 
-    def region(self, shown: Scene, region: Rect[float] | None) -> Scene:
-        """What the renderer is to show of a shown scene: a region of its picture, or all of it (None)."""
-        if region is None:
+    def rendered(self, shown: Scene, region: Rect[float] | None, local: frozenset[str] | None) -> Scene:
+        """What the renderer is to show of a shown scene: a region of its picture, or all of it (None), and of
+        its objects those with these names and what shines, or all (None)."""
+        if region is None and local is None:
             return shown
-        key = id(shown), region
-        if key not in self._cropped:
-            self._cropped[key] = shown, _cropped(shown, region)
-        self._cropped.move_to_end(key)
-        while len(self._cropped) > _MOST_KNOWN:
-            self._cropped.popitem(last=False)
-        return self._cropped[key][1]
+        key = id(shown), region, local
+        if key not in self._rendered:
+            alone = shown if local is None else _alone(shown, local)
+            self._rendered[key] = shown, alone if region is None else _cropped(alone, region)
+        self._rendered.move_to_end(key)
+        while len(self._rendered) > _MOST_KNOWN:
+            self._rendered.popitem(last=False)
+        return self._rendered[key][1]
 
     def edited(self, shown: Scene, camera: Camera | None, own: Camera) -> Scene:
         """The edited scene of one that was made from a shown scene: with `own`, its own active camera, in
@@ -118,6 +125,14 @@ def region_of(box: Rect[float], size: tuple[int, int]) -> Rect[float] | None:
         return None
     width, height = size
     return Rect(left / width, top / height, (right - left) / width, (bottom - top) / height)
+
+
+def _alone(scene: Scene, names: frozenset[str]) -> Scene:
+    def stays(one: Object) -> bool:
+        return one.name in names or scene.materials[one.material].is_emissive
+
+    hidden = [one.name for one in scene.objects if one.visible and not stays(one)]
+    return edits.set_visible(scene, hidden, False)
 
 
 def _cropped(scene: Scene, region: Rect[float]) -> Scene:

@@ -56,6 +56,8 @@ def draw(display: DisplaySettings, refusals: Refusals) -> DisplaySettings:
     if overlay != "none":
         opacity = widgets.number("Opacity", opacity, low=0.0, high=1.0, speed=0.01, decimals=2)
     grid = widgets.checkbox("Tile grid", display.tile_grid)
+    floor_grid = widgets.checkbox("Floor grid", display.floor_grid, "Lines on the floor y = 0")
+    axes = widgets.checkbox("Axes", display.axes, "Those of the world, in the corner of the picture")
     outline = widgets.checkbox("Outline", display.outline, "Around the selection, and marks of lights")
     split = widgets.checkbox("Split view", display.split, "Left: restart, right: the chosen strategy")
     return refusals.changed(
@@ -67,6 +69,8 @@ def draw(display: DisplaySettings, refusals: Refusals) -> DisplaySettings:
         overlay_opacity=opacity,
         tile_grid=grid,
         outline=outline,
+        floor_grid=floor_grid,
+        axes=axes,
         split=split,
     )
 

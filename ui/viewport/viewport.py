@@ -17,7 +17,15 @@ from incpt.ui.display.projection import split_x
 from incpt.ui.editor.state import TRANSFORM_KEY, Beginning, Tool
 from incpt.ui.preferences import DisplaySettings, Preferences, SnapSettings
 from incpt.ui.rect import Point, Rect
-from incpt.ui.viewport import box_select, light_marks, modal_input, modal_marks, point_pick
+from incpt.ui.viewport import (
+    axis_widget,
+    box_select,
+    floor_grid,
+    light_marks,
+    modal_input,
+    modal_marks,
+    point_pick,
+)
 from incpt.ui.viewport.box_select import BoxSelect
 from incpt.ui.viewport.gizmo import Gizmo
 from incpt.ui.viewport.light_handles import LightHandles
@@ -125,6 +133,10 @@ class Viewport:
         self._is_blocked = is_blocked
         places.note_rect("picture", picture)
         outcome = Outcome(scene, selection, preferences.display)
+        if preferences.display.floor_grid:
+            floor_grid.draw(scene.camera, picture)
+        if preferences.display.axes:
+            axis_widget.draw(scene.camera, picture, _mouse())
         if preferences.display.outline:
             light_marks.draw(scene, selection, picture)
         if beginning is not None:
@@ -365,6 +377,10 @@ def pixels_in(area: Rect[float]) -> tuple[int, int] | None:
 
 def _clicked(outcome: Outcome, at: Point, action: MouseAction, picture: Rect[float]) -> Outcome:
     is_additive, wants_menu = action is MouseAction.SELECT_MORE, action is MouseAction.SELECT_OR_MENU
+    side = axis_widget.side_at(outcome.scene.camera, picture, at) if outcome.display.axes else None
+    if side is not None:
+        looking = replace(outcome.scene, camera=camera_moves.set_view(outcome.scene.camera, side))
+        return outcome.proposed(Proposal(looking, f"Look from {side}", f"look from {side}"))
     if not picture.contains(at):
         return outcome if is_additive else replace(outcome, selection=Selection())
     light = light_marks.light_at(outcome.scene, at, picture) if outcome.display.outline else None

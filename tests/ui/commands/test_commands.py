@@ -14,6 +14,7 @@ import pytest
 from support.small_scenes import mixed_scene
 from support.ui_harness import Desk, changes, desk, flat, places, state
 
+from incpt.scene.arranging import ENDS
 from incpt.scene.material import Material
 from incpt.scene.model import Scene
 from incpt.scene.selection import Selection
@@ -109,6 +110,8 @@ def test_every_command_runs_everywhere(one: Command, where: str, selected: int) 
 NEEDS_SELECTION = {
     "Move", "Rotate", "Scale", "Copy", "Duplicate", "Duplicate and move", "Delete", "Rename…", "Hide",
     "Clear position", "Clear rotation", "Clear scale", "Clear all three", "Aim light",
+    "Hide unselected", "Drop to the floor", "Local view",
+    *(f"{end.capitalize()} {axis}" for axis in "XYZ" for end in ENDS),
 }  # fmt: skip
 NEEDS_PICTURE = {"Export picture…", "Copy picture", "Pin reference"}
 NEEDS_CAMERAS = {"Next camera"}

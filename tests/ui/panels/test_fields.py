@@ -181,6 +181,8 @@ CHECKBOXES = [
     ("Method", "Denoise", "preferences.display.denoise"),
     ("Method", "Tile grid", "preferences.display.tile_grid"),
     ("Method", "Outline", "preferences.display.outline"),
+    ("Method", "Floor grid", "preferences.display.floor_grid"),
+    ("Method", "Axes", "preferences.display.axes"),
     ("Method", "Split view", "preferences.display.split"),
 ]
 
@@ -450,7 +452,7 @@ def test_every_widget_of_the_panels_is_tested(user: Desk) -> None:
         shown |= {
             name
             for name in places.names()
-            if not name.startswith(("menu ", "object ", "visible ", "slot ", "thumbnail "))
+            if not name.startswith(("menu ", "object ", "visible ", "slot ", "thumbnail ", "axis "))
             and name not in ("Search", "status", "picture", "gizmo")
         }
     assert shown - tested - SECTIONS - SHOWN_ONLY - NOT_AT_FIRST == ELSEWHERE
