@@ -165,7 +165,10 @@ MODAL_LINES = (
     ),
     ("Tab", "Type the number of the next axis of a move"),
     ("Backspace", "Take the last digit back; without one the mouse counts again"),
-    ("Ctrl", "In steps, those of Snap; freely, where Snap is on"),
+    (
+        "Ctrl",
+        "Snaps as the Gizmo section says: in steps, or to surfaces or vertices; freely, where Snap is on",
+    ),
     ("Shift", "A tenth of the mouse's way, and of a step"),
     ("G, R, S", "Move, rotate or scale instead; R while it rotates: a trackball"),
     ("Enter, left click", "Done: one edit to undo"),

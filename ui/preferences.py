@@ -34,6 +34,8 @@ OVERLAYS = (
     "error_left", "touched", "pairs", "weight",
 )  # fmt: skip
 """What may be laid over the picture, in the order of the menu."""
+SNAP_TARGETS = ("steps", "surface", "vertex")
+"""What a move snaps to."""
 SHADINGS = ("rendered", "material", "solid")
 """How the scene is shown: rendered, or shaded by OpenGL with its materials or in plain colours."""
 NAVIGATIONS = ("blender", "plain")
@@ -43,6 +45,7 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
     "overlay": OVERLAYS,
     "navigation": NAVIGATIONS,
     "shading": SHADINGS,
+    "target": SNAP_TARGETS,
 }
 """The values that a text may have, by name of the field."""
 RANGES: Mapping[str, tuple[float, float]] = {
@@ -147,9 +150,11 @@ class DisplaySettings(_Group):
 
 @dataclass(frozen=True)
 class SnapSettings(_Group):
-    """Steps of moves, turns and scalings while snapping: metres, degrees, factor. Raises InputError."""
+    """Snapping: to steps of moves, turns and scalings (metres, degrees, factor), or a move to what is under
+    the mouse, one of SNAP_TARGETS. Raises InputError."""
 
     enabled: bool = False
+    target: str = "steps"
     move_m: float = 0.1
     rotate_deg: float = 15.0
     scale: float = 0.1

@@ -204,7 +204,8 @@ COMMANDS: tuple[Command, ...] = (
               help="Several are turned and scaled about it")
       for pivot, text in PIVOTS),
     Command("Snap", "Edit", _switch_snap, "Shift+Tab", plain_keys="X", group=4,
-            checked=lambda e: e.preferences.snap.enabled, help="Move, rotate and scale in steps"),
+            checked=lambda e: e.preferences.snap.enabled,
+            help="In steps, or to what is under the mouse, as the Object panel says"),
     Command("Add…", "Object", lambda e: e.open_menu("add"), "Shift+A",
             help="What can be added, in a menu at the mouse"),
     *(Command(shape.capitalize(), "Object/Add", _add(shape), help=f"Add a {shape} where the camera looks")

@@ -81,12 +81,14 @@ class Gizmo:
         view = view_matrix(scene.camera)
         projection = projection_matrix(scene.camera, picture.width / picture.height)
         flat = _flat(matrix)
+        # What handles hold is an axis, and the mouse points at nothing beside it.
+        has_steps = snap.enabled and (tool.operation != "move" or snap.target == "steps")
         is_local = tool.space == "local" or tool.operation == "scale"
         step = {"move": snap.move_m, "rotate": snap.rotate_deg, "scale": snap.scale}[tool.operation]
         _gizmo.manipulate(
             _flat(view), _flat(projection), _OPERATIONS[tool.operation],
             _gizmo.MODE.local if is_local else _gizmo.MODE.world,
-            flat, None, _gizmo.Matrix3([step] * 3) if snap.enabled else None,
+            flat, None, _gizmo.Matrix3([step] * 3) if has_steps else None,
         )  # fmt: skip
         _note_place(view, projection, matrix, picture)
         moved = np.array(flat.values, np.float64).reshape(4, 4).T

@@ -21,7 +21,7 @@ from incpt.scene import edits, placing
 from incpt.scene.model import Placed, Scene
 from incpt.ui.preferences import SnapSettings
 from incpt.ui.rect import Point, Rect
-from incpt.ui.viewport import axis_constraint, drag_geometry, pivot, typed_number
+from incpt.ui.viewport import axis_constraint, drag_geometry, pivot, snapping, typed_number
 from incpt.ui.viewport.axis_constraint import AXES, AxisConstraint
 from incpt.ui.viewport.typed_number import TypedNumber
 
@@ -207,6 +207,10 @@ class ModalTransform:
             return offset
         scene, picture, held = self.start.scene, self.start.picture, self.start.held
         axes = self.start.axes_of(self.start.names[-1], self._is_local)
+        if self._snaps_to_something:
+            snapped = self._snapped(axes)
+            if snapped is not None:
+                return snapped
         if self.constraint is None:
             offset = drag_geometry.in_view_plane(scene.camera, picture, held, self.way)
         elif self.constraint.is_plane:
@@ -216,7 +220,26 @@ class ModalTransform:
         else:
             axis = self.constraint.axis
             offset[axis] = drag_geometry.along_axis(scene.camera, picture, held, axes[:, axis], self.way)
+        if self._snaps_to_something:
+            return offset
         return np.array([self._in_steps(metres, self.start.snap.move_m) for metres in offset])
+
+    @property
+    def _snaps_to_something(self) -> bool:
+        return self.is_snapping and self.start.snap.target != "steps"
+
+    def _snapped(self, axes: Array) -> Array | None:
+        """(3,) the offset that brings it to what the mouse points at, as far as the constraint lets it; None
+        where it points at nothing."""
+        start, kind = self.start, self.start.snap.target
+        target = snapping.target(start.scene, start.names, start.picture, self.mouse, kind)
+        if target is None:
+            return None
+        base = snapping.base(start.scene, start.names, start.picture, self.began, kind, start.pivot)
+        offset: Array = axes.T @ (target - base)
+        free = (0, 1, 2) if self.constraint is None else self.constraint.free
+        offset[[axis for axis in range(3) if axis not in free]] = 0.0
+        return offset
 
     @cached_property
     def angle(self) -> float:

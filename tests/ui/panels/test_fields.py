@@ -162,6 +162,7 @@ CHOICES = [
     ("Object", "Alpha mode", "Blend", "blend", "scene.materials.red.alpha_mode"),
     ("Object", "Gizmo", "Rotate", "rotate", "tool.operation"),
     ("Object", "Axes", "The object's axes", "local", "tool.space"),
+    ("Object", "Snap to", "Vertices", "vertex", "preferences.snap.target"),
     ("Object", "Pivot", "Own origins", "individual", "tool.pivot"),
     ("Render", "Strategy", "Restart", "restart", "scene.settings.strategy"),
     ("Render", "Strategy", "Impact", "impact", "scene.settings.strategy"),
