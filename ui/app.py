@@ -45,7 +45,9 @@ class App:
         self.editor.start_over(document, opened)
         self.editor.renderer.show(self.editor.view)
         try:
-            self.window = Window(kept.window_size, "incpt", preferences.layout_path(), kept.ui_scale)
+            self.window = Window(
+                kept.window_size, "incpt", preferences.layout_path(), kept.ui_scale, kept.theme
+            )
         except BaseException:
             self.editor.renderer.close()
             raise
@@ -105,6 +107,8 @@ class App:
         self._area = take_frame(editor, self.workspace, self.viewport, self.display.overlay())
         window.set_title(editor.title)
         window.show_full_screen(editor.screen.is_full_screen)
+        window.look(editor.preferences.ui_scale, editor.preferences.theme)
+        self.recovery.seconds = editor.preferences.autosave_seconds
         window.end_frame(self._draw_below, is_swapped)
         self._keep_preferences()
 

@@ -31,6 +31,24 @@ if sys.platform == "darwin":  # imgui takes the key of that place for Ctrl there
     _PRINTED |= {"Ctrl": "Cmd", "Alt": "Option", CTRL: "Cmd", ALT: "Option"}
 
 
+KEY_NAMES = (
+    *(chr(letter) for letter in range(ord("A"), ord("Z") + 1)),
+    *(f"F{number}" for number in range(1, 13)),
+    *(f"Keypad{digit}" for digit in range(10)),
+    "KeypadDecimal", "KeypadDivide", "Delete", "Insert", "Home", "End", "Space", "Tab", "Comma", "Period",
+    "Slash",
+)  # fmt: skip
+"""The keys that a command may have, beside Escape, by their names in the tables."""
+MODIFIERS = ("Ctrl", "Shift", "Alt")
+"""What is held with them, in the order in which it is written."""
+
+
+def is_chord(text: str) -> bool:
+    """Whether a text such as "Ctrl+Shift+S" names keys that a command may have."""
+    *held, key = text.split("+")
+    return key in KEY_NAMES and len(set(held)) == len(held) and set(held) <= set(MODIFIERS)
+
+
 def printed(keys: Iterable[str]) -> str:
     """Keys that are pressed together, as people read them on a keyboard: "Ctrl + Numpad 1"."""
     return " + ".join(_PRINTED.get(key, key) for key in keys)

@@ -30,6 +30,8 @@ class Layout:
         self._is_laid_out = False
         self._wanted_tabs: tuple[str, ...] = ()
         self._front: list[str] = []
+        self._scale = 0.0
+        """That of texts when panels were made as wide as they have to be."""
 
     def dock(self, is_reset: bool) -> Rect[float]:
         """Make room for the panels, which stand as at the first start where `is_reset`; returns what is left
@@ -40,6 +42,10 @@ class Layout:
             _lay_out(root)
             self._wanted_tabs = ("Object",)
         self._is_laid_out, self._front = True, []
+        scale = imgui.get_style().font_scale_dpi
+        if scale != self._scale:
+            _widen(_LEAST_WIDTH * scale)
+            self._scale = scale
         imgui.dock_space_over_viewport(root, None, imgui.DockNodeFlags_.passthru_central_node)
         node = imgui.internal.dock_builder_get_central_node(root)
         return Rect(node.pos.x, node.pos.y, node.size.x, node.size.y)
@@ -65,6 +71,20 @@ class Layout:
         for name in self._wanted_tabs:
             imgui.set_window_focus(name)
         self._wanted_tabs = ()
+
+
+def _widen(least: float) -> None:
+    """Give the panels that width at least, where they stand beside the picture; what is wider stays so."""
+    window = imgui.internal.find_window_by_name("Object")
+    node = None if window is None else window.dock_node
+    while node is not None and node.parent_node is not None:
+        is_beside = node.parent_node.split_axis == imgui.internal.Axis.x
+        if is_beside and node.size.x < least:
+            size = imgui.ImVec2(least, node.size.y)
+            imgui.internal.dock_builder_set_node_size(node.id_, size)
+        if is_beside:
+            return
+        node = node.parent_node
 
 
 def _lay_out(root: int) -> None:

@@ -34,6 +34,8 @@ OVERLAYS = (
     "error_left", "touched", "pairs", "weight",
 )  # fmt: skip
 """What may be laid over the picture, in the order of the menu."""
+THEMES = ("dark", "light")
+"""How panels look."""
 SNAP_TARGETS = ("steps", "surface", "vertex")
 """What a move snaps to."""
 SHADINGS = ("rendered", "material", "solid")
@@ -45,6 +47,7 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
     "overlay": OVERLAYS,
     "navigation": NAVIGATIONS,
     "shading": SHADINGS,
+    "theme": THEMES,
     "target": SNAP_TARGETS,
 }
 """The values that a text may have, by name of the field."""
@@ -90,6 +93,8 @@ def _checked(name: str, value: Any, default: Any) -> Any:
         return _recent(value)
     if name == "hidden_panels":
         return _panels(value)
+    if name == "keys":
+        return _keys(value)
     if name == "window_size":
         if not isinstance(value, (list, tuple)) or len(value) != 2:
             raise InputError(f"{name}: {value!r} is not a pair of width and height")
@@ -122,6 +127,13 @@ def _panels(value: Any) -> tuple[str, ...]:
     if not isinstance(value, (list, tuple)) or not all(name in PANELS for name in value):
         raise InputError(f"hidden_panels: is not a list of some of {', '.join(PANELS)}")
     return tuple(name for name in PANELS if name in value)
+
+
+def _keys(value: Any) -> tuple[tuple[str, str], ...]:
+    pairs = value if isinstance(value, (list, tuple)) else [None]
+    if not all(isinstance(pair, (list, tuple)) and list(map(type, pair)) == [str, str] for pair in pairs):
+        raise InputError('keys: are not pairs of a command and its keys, such as ["Hide", "Ctrl+H"]')
+    return tuple((command, keys) for command, keys in dict(map(tuple, pairs)).items())
 
 
 @dataclass(frozen=True)
@@ -166,6 +178,7 @@ class Preferences(_Group):
 
     window_size       width and height, screen coordinates.
     ui_scale          of texts and widgets; None: as the monitor says.
+    theme             one of THEMES.
     navigation        set of mouse bindings, see `bindings.py`.
     recent            absolute paths of scene and mesh files, the latest first.
     step_ms           time that one rendering step aims at.
@@ -174,12 +187,14 @@ class Preferences(_Group):
     autosave_seconds  between two writes of the recovery file.
     fly_speed         metres per second.
     hidden_panels     those of PANELS that are not shown.
+    keys              of commands that have others than in the tables, by name: "Ctrl+H", or nothing.
     """
 
     display: DisplaySettings = DisplaySettings()
     snap: SnapSettings = SnapSettings()
     window_size: tuple[int, int] = (1440, 900)
     ui_scale: float | None = None
+    theme: str = "dark"
     navigation: str = "blender"
     recent: tuple[str, ...] = ()
     step_ms: float = 33.0
@@ -188,6 +203,7 @@ class Preferences(_Group):
     autosave_seconds: float = 30.0
     fly_speed: float = 2.0
     hidden_panels: tuple[str, ...] = ()
+    keys: tuple[tuple[str, str], ...] = ()
 
     def with_recent(self, path: str | os.PathLike[str]) -> Preferences:
         """Preferences in which `path` was opened last."""
@@ -275,7 +291,11 @@ def _fill(table: Any, owner: Any) -> None:
         elif value is None:
             table.pop(field.name, None)
         else:
-            table[field.name] = list(value) if isinstance(value, tuple) else value
+            table[field.name] = _as_lists(value)
+
+
+def _as_lists(value: Any) -> Any:
+    return [_as_lists(one) for one in value] if isinstance(value, tuple) else value
 
 
 def _read(kind: type[_G], table: Mapping[str, Any], place: str, messages: list[str]) -> _G:

@@ -36,7 +36,9 @@ class Dropped(NamedTuple):
 class Window:
     """A window with a context that is current, and imgui in it. Raises DeviceError where none opens."""
 
-    def __init__(self, size: tuple[int, int], title: str, layout_file: Path, scale: float | None) -> None:
+    def __init__(
+        self, size: tuple[int, int], title: str, layout_file: Path, scale: float | None, theme_name: str
+    ) -> None:
         _init_glfw()
         for hint, value in (
             (glfw.CONTEXT_VERSION_MAJOR, 3),
@@ -58,7 +60,7 @@ class Window:
         self._title = title
         self._frames_due = _SETTLING_FRAMES
         self._tooltip_at = math.inf
-        self._fixed_scale = scale
+        self._fixed_scale, self._theme = scale, theme_name
         self._place_before: tuple[int, int, int, int] | None = None
         """Where the window was before it took the whole screen: left, top, width, height."""
         self._listen()
@@ -90,6 +92,7 @@ class Window:
         io.set_ini_filename(str(layout_file))
         theme.load_font()
         self._scale = 0.0
+        self._applied: tuple[float, str] | None = None
         self._follow_scale()
         address = ctypes.cast(self.handle, ctypes.c_void_p).value
         assert address is not None
@@ -113,6 +116,12 @@ class Window:
     def framebuffer_size(self) -> tuple[int, int]:
         width, height = glfw.get_framebuffer_size(self.handle)
         return width, height
+
+    def look(self, scale: float | None, theme_name: str) -> None:
+        """Draw texts and widgets at that scale (None: as the monitor says) and in that theme from now on."""
+        if (scale, theme_name) != (self._fixed_scale, self._theme):
+            self._fixed_scale, self._theme = scale, theme_name
+            self.redraw()
 
     def show_full_screen(self, on: bool) -> None:
         """Take the whole of the screen on which the window is, or go back to where it was."""
@@ -169,7 +178,8 @@ class Window:
         imgui.render()
         self.context.screen.use()
         self.context.viewport = (0, 0, *self.framebuffer_size)
-        self.context.clear(0.085, 0.085, 0.085)
+        grey = theme.surround()
+        self.context.clear(grey, grey, grey)
         draw_below()
         self.context.screen.use()
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
@@ -201,9 +211,9 @@ class Window:
         content = glfw.get_window_content_scale(self.handle)[0]
         points = self.framebuffer_size[0] / max(glfw.get_window_size(self.handle)[0], 1)
         scale = self._fixed_scale or content / max(points, 1.0)
-        if scale != self._scale:
-            self._scale = scale
-            theme.apply(scale)
+        if (scale, self._theme) != self._applied:
+            self._scale, self._applied = scale, (scale, self._theme)
+            theme.apply(scale, self._theme)
 
     def _drop(self, _window: Any, paths: Any, *_: Any) -> None:
         # The stubs of glfw have the C signature; the wrapper passes a list of paths.

@@ -39,6 +39,7 @@ def changed(kind: type, ui_scale: float | None) -> Any:
         "snap": lambda: changed(SnapSettings, None),
         "window_size": lambda: (800, 600),
         "ui_scale": lambda: ui_scale,
+        "keys": lambda: (("Hide", "Ctrl+H"), ("Move", "")),
         "hidden_panels": lambda: ("Object", "Method"),
         "recent": lambda: ("/a.toml", '/ü "b".toml'),
     }

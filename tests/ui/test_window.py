@@ -482,3 +482,38 @@ def test_a_final_render_goes_on_while_a_region_is_edited_and_the_screen_is_fille
     hand.pump(lambda: hand.app.window.framebuffer_size == window.WINDOW_SIZE, timeout=20)
     hand.key("Escape")
     hand.pump(lambda: editor.frame.view.region is None, timeout=30)
+
+
+def test_texts_are_sharp_at_any_scale_and_the_theme_is_changed_at_once(hand: Hand) -> None:
+    from imgui_bundle import imgui
+
+    editor = hand.app.editor
+
+    def sharpness(scale: float) -> float:
+        """Of the edges of the letters in a tab: how much of them is neither ink nor ground."""
+        editor.preferences = replace(editor.preferences, ui_scale=scale)
+        hand.pump(frames=8)
+        shown = keep(hand, f"scale-{scale:g}")
+        place = hand.place("menu View")
+        box = shown[int(place.top) : int(place.bottom), int(place.left) : int(place.right)].astype(float)
+        grey = (box.mean(axis=2) - box.min()) / (box.max() - box.min())
+        return float(((grey > 0.2) & (grey < 0.8)).sum() / (grey >= 0.8).sum())
+
+    sharp = {scale: sharpness(scale) for scale in (1.0, 1.5, 2.0)}
+    # Letters that were blown up would have edges as much wider as they are, and the ink between grows too.
+    assert sharp[2.0] < 0.75 * sharp[1.0] and sharp[1.5] < sharp[1.0], sharp
+    tab = imgui.internal.find_window_by_name("Method").dc.dock_tab_item_rect
+    assert tab.max.x - tab.min.x > 100 and tab.max.x <= window.WINDOW_SIZE[0], "the last tab is seen whole"
+    editor.preferences = replace(editor.preferences, ui_scale=1.0)
+    hand.pump(frames=6)
+    dark = keep(hand, "dark")
+    hand.key("ctrl+comma")
+    hand.pump(frames=4)
+    hand.click("Theme")
+    hand.pump(frames=4)
+    hand.click("Theme: Light")
+    hand.key("Escape")
+    light = keep(hand, "light")
+    assert light[:10].mean() > dark[:10].mean() + 100, "the menu bar"
+    x, y = map(round, hand.in_picture(0.5, 0.5))
+    assert np.abs(light[y, x].astype(int) - dark[y, x]).max() < 120

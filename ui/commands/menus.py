@@ -71,9 +71,9 @@ def pressed_command(editor: Editor) -> Command | None:
     if imgui.is_key_pressed(imgui.Key.escape, False) and imgui.is_popup_open("", _ANY_POPUP):
         imgui.internal.close_popup_to_level(0, True)
         return None
-    navigation = editor.preferences.navigation
+    navigation, own = editor.preferences.navigation, dict(editor.preferences.keys)
     for one in COMMANDS:
-        if any(imgui.is_key_chord_pressed(key_chord(keys)) for keys in one.keys_in(navigation)):
+        if any(imgui.is_key_chord_pressed(key_chord(keys)) for keys in one.keys_in(navigation, own)):
             # A menu at the mouse shows keys, and one that is pressed takes the place of a click there.
             if any(map(imgui.is_popup_open, _popups())):
                 imgui.internal.close_popup_to_level(0, True)
@@ -134,7 +134,8 @@ def _draw_commands(editor: Editor, commands: list[Command]) -> Action | None:
     chosen = None
     for one in commands:
         is_checked = one.checked is not None and one.checked(editor)
-        keys = next(iter(one.printed_keys(editor.preferences.navigation)), "")
+        own = dict(editor.preferences.keys)
+        keys = next(iter(one.printed_keys(editor.preferences.navigation, own)), "")
         detail = one.detail(editor) if one.detail is not None else None
         label = f"{one.name} {detail}###{one.name}" if detail else one.name
         pressed, _ = imgui.menu_item(label, keys, is_checked, one.is_enabled(editor))

@@ -6,6 +6,7 @@ as in most other tools. Where a command has one `keys`, both sets share it.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
@@ -15,13 +16,14 @@ from incpt.scene.arranging import ENDS
 from incpt.scene.edits import LIGHT_NAMES
 from incpt.scene.shapes import SHAPES
 from incpt.ui.commands import camera, files, materials, objects, pictures, rendering, views, window
-from incpt.ui.commands.command import Action, Command, Test
+from incpt.ui.commands.command import NO_KEYS, Action, Command, Test
 from incpt.ui.dialogs.about import About
 from incpt.ui.dialogs.help_page import HelpPage
+from incpt.ui.dialogs.preferences_dialog import PreferencesDialog
 from incpt.ui.editor.editor import Editor
 from incpt.ui.panels.display import OVERLAY_TEXTS, SHADING_HELP, SHADING_TEXTS
 from incpt.ui.panels.tool import PIVOTS
-from incpt.ui.preferences import PANELS
+from incpt.ui.preferences import PANELS, Preferences
 
 MENUS = ("File", "Edit", "Object", "View", "Render", "Help")
 """The menus of the bar, from left to right."""
@@ -149,7 +151,17 @@ def _shows_panel(name: str) -> Test:
 
 
 def _show_help(editor: Editor) -> None:
-    editor.dialog = HelpPage(help_lines, editor.preferences.navigation, editor.choose_navigation)
+    own = dict(editor.preferences.keys)
+    editor.dialog = HelpPage(
+        lambda name: help_lines(name, own), editor.preferences.navigation, editor.choose_navigation
+    )
+
+
+def _show_preferences(editor: Editor) -> None:
+    def change(preferences: Preferences) -> None:
+        editor.preferences = preferences
+
+    editor.dialog = PreferencesDialog(editor.preferences, change, key_rows)
 
 
 def _show_about(editor: Editor) -> None:
@@ -206,6 +218,8 @@ COMMANDS: tuple[Command, ...] = (
     Command("Snap", "Edit", _switch_snap, "Shift+Tab", plain_keys="X", group=4,
             checked=lambda e: e.preferences.snap.enabled,
             help="In steps, or to what is under the mouse, as the Object panel says"),
+    Command("Preferences…", "Edit", _show_preferences, "Ctrl+Comma", group=5,
+            help="How the editor looks and saves, and its keys"),
     Command("Add…", "Object", lambda e: e.open_menu("add"), "Shift+A",
             help="What can be added, in a menu at the mouse"),
     *(Command(shape.capitalize(), "Object/Add", _add(shape), help=f"Add a {shape} where the camera looks")
@@ -339,15 +353,21 @@ SELECTION_MENU: tuple[tuple[str, ...], ...] = (
 """What can be done with what is selected, by names of commands, in groups."""
 
 
+def key_rows(navigation: str, own: Mapping[str, str]) -> list[tuple[str, tuple[str, ...]]]:
+    """The names of all commands whose keys may be changed, with their keys, in the order of the menus."""
+    return [(one.name, one.keys_in(navigation, own)) for one in COMMANDS if one.keys != "Escape"]
+
+
 def command(name: str) -> Command:
     """The command of that name. Raises KeyError."""
     return _BY_NAME[name]
 
 
-def help_lines(navigation: str) -> list[tuple[str, str]]:
-    """(keys, what they do) for Help: the commands that have keys in that set, in the order of the menus."""
+def help_lines(navigation: str, own: Mapping[str, str] = NO_KEYS) -> list[tuple[str, str]]:
+    """(keys, what they do) for Help: the commands that have keys in that set, in the order of the menus;
+    `own` is that of `Command.keys_in`."""
     lines = [
-        (" or ".join(one.printed_keys(navigation)), f"{one.name}: {one.help}" if one.help else one.name)
+        (" or ".join(one.printed_keys(navigation, own)), f"{one.name}: {one.help}" if one.help else one.name)
         for one in COMMANDS
     ]
     return [(keys, text) for keys, text in lines if keys]

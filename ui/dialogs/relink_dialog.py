@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 from incpt.formats.relink import MissingFile
 from incpt.ui.dialogs import modal
 from incpt.ui.editor.dialog import Answer, Dialog
-from incpt.ui.widgets import theme, widgets
+from incpt.ui.widgets import widgets
 
 _WIDTH = 620.0
 """Width of the dialog, in points at a scale of 1."""
@@ -58,7 +58,7 @@ class RelinkDialog:
                 imgui.same_line(imgui.get_content_region_avail().x - imgui.calc_text_size("Choose…").x)
                 if widgets.button(f"Choose…##{one.path.name}"):
                     wanted = one
-                widgets.note(_described(one), theme.QUIET)
+                widgets.note(_described(one))
                 imgui.pop_id()
         imgui.end_child()
         return wanted

@@ -13,7 +13,7 @@ from incpt.picture import denoise
 from incpt.ui.dialogs import modal
 from incpt.ui.editor.dialog import Answer, Dialog
 from incpt.ui.editor.state import FinalChoice
-from incpt.ui.widgets import focus, places, theme, widgets
+from incpt.ui.widgets import focus, places, widgets
 
 FREE_VIEW = ""
 """What stands for the free view among the names of cameras."""
@@ -70,7 +70,7 @@ class RenderDialog:
         self._draw_quality()
         is_place_wanted = self._draw_file()
         if self._refusal:
-            widgets.note(self._refusal, theme.WARNING)
+            widgets.note(self._refusal, "warning")
         # Enter and Escape that end the typing of a number are not for the dialog.
         chosen = modal.buttons(["Render", "Cancel"], takes_keys=not focus.is_typing())
         modal.end()

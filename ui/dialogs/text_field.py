@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 
 from incpt.ui.dialogs import modal
 from incpt.ui.editor.dialog import Answer
-from incpt.ui.widgets import places, theme, widgets
+from incpt.ui.widgets import places, widgets
 
 
 class TextField:
@@ -30,7 +30,7 @@ class TextField:
             _, self.text = imgui.input_text(field, self.text, imgui.InputTextFlags_.auto_select_all)
             places.note(self.label)
         if self._refusal:
-            widgets.note(self._refusal, theme.WARNING)
+            widgets.note(self._refusal, "warning")
         chosen = modal.buttons(["OK", "Cancel"])
         modal.end()
         if chosen is None:

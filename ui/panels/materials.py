@@ -120,7 +120,7 @@ def _row(
         imgui.end_drag_drop_source()
     _draw_ball(materials[name], start, side, thumbnails)
     count = f"{users:,}" if users else "unused"
-    tint = imgui.get_color_u32(imgui.ImVec4(*theme.QUIET))
+    tint = imgui.get_color_u32(imgui.ImVec4(*theme.text_color("quiet")))
     right = start.x + imgui.get_content_region_avail().x - imgui.calc_text_size(count).x
     imgui.get_window_draw_list().add_text((right, start.y), tint, count)
     imgui.pop_id()

@@ -16,8 +16,8 @@ from incpt.ui.widgets import icons, places, theme, widgets
 from incpt.viewer.renderer import FinalProgress
 from incpt.viewer.view import Frame, Picture
 
-_COLORS = {"done": theme.QUIET, "warning": theme.WARNING, "error": theme.ERROR}
-"""Colours of notices, by level."""
+_ROLES = {"done": "quiet", "warning": "warning", "error": "error"}
+"""Roles of the text of notices, by level: see `theme.text_color`."""
 _FINAL_LINES = 18.0
 """Width of the bar of a final render, in heights of a line."""
 _JOB_LINES = 22.0
@@ -153,7 +153,7 @@ def draw_notices(notices: Sequence[Notice], picture: Rect[float], now: float) ->
                 places.note(f"copy {i}")
                 imgui.set_item_tooltip("Copy this line")
                 imgui.same_line()
-            imgui.text_colored(imgui.ImVec4(*_COLORS[notice.level]), notice.text)
+            imgui.text_colored(imgui.ImVec4(*theme.text_color(_ROLES[notice.level])), notice.text)
             imgui.pop_style_var()
             imgui.pop_id()
         imgui.pop_text_wrap_pos()

@@ -101,7 +101,7 @@ def _row(
     style = imgui.get_style()
     width = imgui.get_content_region_avail().x
     button = imgui.calc_text_size(icons.EYE_SLASH).x + 2 * style.frame_padding.x + style.item_spacing.x
-    tint = theme.ACCENT if name == selection.active else theme.TEXT if one.visible else theme.QUIET
+    tint = theme.text_color("marked" if name == selection.active else "text" if one.visible else "quiet")
     imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*tint))
     flags = imgui.SelectableFlags_.allow_double_click
     label = f"{_text(one)}###{name}"
@@ -120,7 +120,7 @@ def _row(
     if pressed:
         outcome = replace(outcome, selection=_pressed(name, selection, names))
     imgui.same_line(width - button + style.item_spacing.x)
-    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.QUIET))
+    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.text_color("quiet")))
     imgui.push_style_color(imgui.Col_.button, imgui.ImVec4(0, 0, 0, 0))
     if imgui.small_button(eye):
         outcome = replace(outcome, switched=name)

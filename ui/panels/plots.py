@@ -8,7 +8,7 @@ import numpy as np
 from imgui_bundle import imgui, implot
 
 from incpt.ui.editor.records import Records, Series
-from incpt.ui.widgets import places, theme, widgets
+from incpt.ui.widgets import places, widgets
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ def draw_reference(is_pinned: bool, is_stale: bool, has_picture: bool) -> Refere
             widgets.same_line()
             is_again = widgets.button("Pin again", "The picture of the scene as it is now")
     if is_stale:
-        widgets.note("The reference is stale: it is of another scene.", theme.WARNING)
+        widgets.note("The reference is stale: it is of another scene.", "warning")
     return ReferenceRequest(is_switch, is_again)
 
 

@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 from incpt.core.layout import TextureSlot
 from incpt.scene.material import Material, texture_name, texture_of
 from incpt.scene.texture import Texture
-from incpt.ui.widgets import places, theme, widgets
+from incpt.ui.widgets import places, widgets
 from incpt.ui.widgets.refusals import Refusals
 from incpt.ui.widgets.thumbnails import Thumbnails
 
@@ -141,7 +141,7 @@ def _draw_thumbnail(slot: TextureSlot, texture: Texture, thumbnails: Thumbnails)
     imgui.text_unformatted(bitmap.source.file or "Made in Python")
     if bitmap.source.index is not None:
         imgui.text_unformatted(f"Its image {bitmap.source.index}")
-    widgets.note(kind_text(slot, texture), theme.QUIET)
+    widgets.note(kind_text(slot, texture))
     imgui.end_tooltip()
 
 

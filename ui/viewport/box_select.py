@@ -82,6 +82,6 @@ def _draw(rect: Rect[float]) -> None:
 def draw_cross(at: Point) -> None:
     """Draw lines across the window through the mouse."""
     canvas, size = imgui.get_background_draw_list(), imgui.get_io().display_size
-    tint = imgui.get_color_u32(imgui.ImVec4(*theme.TEXT[:3], 0.5))
+    tint = imgui.get_color_u32(imgui.ImVec4(*theme.ON_PICTURE[:3], 0.5))
     canvas.add_line((at[0], 0.0), (at[0], size.y), tint)
     canvas.add_line((0.0, at[1]), (size.x, at[1]), tint)

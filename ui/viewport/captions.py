@@ -62,7 +62,7 @@ def write_label(canvas: imgui.ImDrawList, at: Point, text: str) -> None:
     dark = imgui.get_color_u32(imgui.ImVec4(0.0, 0.0, 0.0, 0.6))
     corner, opposite = (at[0] - pad, at[1] - pad / 2), (at[0] + size.x + pad, at[1] + size.y + pad / 2)
     canvas.add_rect_filled(corner, opposite, dark, 3.0)
-    canvas.add_text(at, imgui.get_color_u32(imgui.ImVec4(*theme.TEXT)), text)
+    canvas.add_text(at, imgui.get_color_u32(imgui.ImVec4(*theme.ON_PICTURE)), text)
 
 
 def _write_numbers(canvas: imgui.ImDrawList, overlay: Overlay, picture: Picture, area: Rect[float]) -> None:

@@ -72,7 +72,7 @@ def _write_header(canvas: imgui.ImDrawList, text: str, picture: Rect[float], lin
 def _draw_dashes(canvas: imgui.ImDrawList, start: Point, end: Point) -> None:
     way = np.subtract(end, start)
     length = float(np.linalg.norm(way))
-    tint = imgui.get_color_u32(imgui.ImVec4(*theme.TEXT))
+    tint = imgui.get_color_u32(imgui.ImVec4(*theme.ON_PICTURE))
     for at in np.arange(0.0, length, 2 * _DASH):
         first, last = start + way * (at / length), start + way * (min(at + _DASH, length) / length)
         canvas.add_line(tuple(first.tolist()), tuple(last.tolist()), tint, 1.0)

@@ -259,9 +259,9 @@ def section(label: str, is_open: bool = True) -> Iterator[bool]:
     imgui.pop_id()
 
 
-def note(message: str, color: theme.Rgba = theme.QUIET) -> None:
-    """A remark below a field, wrapped."""
-    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*color))
+def note(message: str, role: str = "quiet") -> None:
+    """A remark below a field, wrapped; `role` is that of `theme.text_color`."""
+    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.text_color(role)))
     imgui.text_wrapped(message)
     imgui.pop_style_color()
 
@@ -302,7 +302,7 @@ def _axis_mark(axis: int, name: str) -> None:
     draw.add_rect_filled((at.x - width, at.y), (at.x, at.y + height), tint)
     size = imgui.calc_text_size(name)
     place = (at.x - 3.0 * width - size.x, at.y + (height - size.y) / 2)
-    draw.add_text(place, imgui.get_color_u32(imgui.ImVec4(*theme.QUIET)), name)
+    draw.add_text(place, imgui.get_color_u32(imgui.ImVec4(*theme.text_color("quiet"))), name)
 
 
 def clipped_text(label: str, width: float) -> None:
