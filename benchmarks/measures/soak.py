@@ -113,7 +113,7 @@ class Soak:
 
     def _is_shown(self) -> bool:
         frame = self.hand.app.editor.frame
-        return frame is not None and frame.view.scene == self.hand.app.editor.shown
+        return frame is not None and frame.view.scene == self.hand.app.editor.view.scene
 
     def say(self, what: str) -> None:
         """More about the action in the log."""
@@ -220,6 +220,18 @@ def _transform_by_keys(soak: Soak) -> None:
         wanted["xyz".index(axis)] += {"0.5": 0.5, "1+0.25": 1.25, "-0.75": -0.75}[number]
         if model.scene.object(name).position != tuple(wanted):
             raise SoakError(f"{name} is at {model.scene.object(name).position} instead of {wanted}")
+
+
+def _drop(soak: Soak) -> None:
+    name = soak.select_one()
+    if name is None:
+        return
+    before = soak.model.scene.object(name)
+    soak.hand.key("End")
+    soak.take_over(lambda old, new: _others(old, (name,)) == _others(new, (name,)))
+    after = soak.model.scene.object(name)
+    if after.position[::2] != before.position[::2] or after.rotation != before.rotation:
+        raise SoakError(f"{name} is dropped from {before.position} to {after.position}")
 
 
 def _delete(soak: Soak) -> None:
@@ -329,6 +341,57 @@ def _choose_overlay(soak: Soak) -> None:
     soak.hand.show_tab("Object")
 
 
+def _draw_region(soak: Soak) -> None:
+    """A part of the picture alone, or all of it again."""
+    if soak.hand.app.editor.viewing.region is not None:
+        soak.hand.key("ctrl+alt+b")
+        return
+    soak.hand.key("ctrl+b")
+    ends = [(soak.random.uniform(0.05, 0.45), soak.random.uniform(0.55, 0.95)) for _ in range(2)]
+    start, end = (soak.hand.in_picture(*corner) for corner in zip(*ends, strict=True))
+    soak.hand.drag(start, end, steps=3)
+
+
+def _shade(soak: Soak) -> None:
+    from incpt.ui.panels.display import SHADING_TEXTS
+
+    text = soak.random.choice(list(SHADING_TEXTS.values()))
+    soak.say(text)
+    soak.hand.show_tab("Method")
+    soak.hand.click("Shading")
+    soak.hand.click(f"Shading: {text}")
+    soak.hand.show_tab("Object")
+
+
+def _leave_alone(soak: Soak) -> None:
+    """The picture has the window, and gives it back."""
+    for _ in range(2):
+        soak.hand.key("ctrl+space")
+
+
+def _switch_local(soak: Soak) -> None:
+    soak.hand.key("slash")
+
+
+def _click_axis(soak: Soak) -> None:
+    from incpt.ui.widgets import places
+
+    side = soak.random.choice(("front", "back", "left", "right", "top", "bottom"))
+    if places.find(f"axis {side}") is not None:
+        soak.hand.click(f"axis {side}")
+
+
+def _render_picture(soak: Soak) -> None:
+    """A final render of a few samples beside all else, whose file is whole."""
+    path, editor = soak.file.with_name("final.exr"), soak.hand.app.editor
+    path.unlink(missing_ok=True)
+    soak.hand.key("F12")
+    soak.hand.type_into("File", str(path))
+    soak.hand.type_into("Samples", "2")
+    soak.hand.click("Render")
+    soak.hand.pump(lambda: path.exists() and editor.rendering.final is None, timeout=60)
+
+
 def _open_menus(soak: Soak) -> None:
     soak.hand.click(f"menu {soak.random.choice(('File', 'Edit', 'View', 'Render', 'Help'))}")
     soak.hand.key("Escape")
@@ -375,9 +438,10 @@ def _export(soak: Soak) -> None:
 
 _ACTIONS: dict[Callable[[Soak], None], float] = {
     _type_transform: 10, _type_nonsense: 2, _drag_transform: 8, _drag_gizmo: 8, _transform_by_keys: 8,
-    _delete: 2, _duplicate: 2,
+    _drop: 2, _delete: 2, _duplicate: 2,
     _add: 2, _hide_or_show: 4, _rename: 1, _move_camera: 6, _wheel: 3, _undo_redo: 8, _pick: 8, _press_key: 8,
-    _choose_overlay: 3, _open_menus: 2, _show_help: 1, _save: 3, _open: 1, _export: 0.5,
+    _choose_overlay: 3, _draw_region: 3, _shade: 3, _leave_alone: 1, _switch_local: 2,
+    _click_axis: 1, _render_picture: 0.5, _open_menus: 2, _show_help: 1, _save: 3, _open: 1, _export: 0.5,
 }  # fmt: skip
 """How often each comes, beside the others."""
 
