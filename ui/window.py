@@ -48,7 +48,7 @@ class Window:
             (glfw.SCALE_TO_MONITOR, True),
         ):
             glfw.window_hint(hint, value)
-        self.handle = glfw.create_window(*size, title, None, None)
+        self.handle = glfw.create_window(*on_screen(size), title, None, None)
         if not self.handle:
             glfw.terminate()
             raise DeviceError("the window needs OpenGL 3.3; install or update the graphics driver")
@@ -236,6 +236,16 @@ def _init_glfw() -> None:
         raise DeviceError(
             f"no window can be opened ({reason}); the editor needs a display, rendering does not"
         )
+
+
+def on_screen(size: tuple[int, int]) -> tuple[int, int]:
+    """A width and a height no larger than what the first screen has room for, beside bars of the desktop."""
+    screen = glfw.get_primary_monitor()
+    if not screen:
+        return size
+    _, _, width, height = glfw.get_monitor_workarea(screen)
+    # Where nobody knows the room it is 0.
+    return min(size[0], width or size[0]), min(size[1], height or size[1])
 
 
 def _screen_at(x: int, y: int) -> Any:

@@ -22,6 +22,7 @@ from incpt.formats import registry
 from incpt.render.modes import Mode
 from incpt.render.session import Session
 from incpt.scene.model import Scene
+from incpt.ui.window import on_screen
 
 pytestmark = pytest.mark.slow
 
@@ -432,6 +433,12 @@ def run_editor(*arguments: str, **environment: str) -> subprocess.CompletedProce
         text=True,
         timeout=60,
     )
+
+
+def test_no_window_is_larger_than_the_screen(hand: Hand) -> None:
+    assert hand.app.window.size <= window.DISPLAY_SIZE
+    assert on_screen((9000, 200)) == (window.DISPLAY_SIZE[0], 200)
+    assert on_screen((200, 9000)) == (200, window.DISPLAY_SIZE[1])
 
 
 def test_a_missing_file_is_one_line_and_status_2(display: str, tmp_path: Path) -> None:
