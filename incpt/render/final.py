@@ -7,6 +7,7 @@ between: the command line shows its progress, the editor goes on.
 from __future__ import annotations
 
 import os
+import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -115,10 +116,24 @@ class FinalRender:
         return report
 
     def write(self) -> None:
-        """Write the picture as it is now. Raises OutputError where that cannot be."""
+        """Write the picture as it is now. Raises OutputError where that cannot be; the picture is then in the
+        system's folder for temporary files, if that has room, and the error says so."""
         wanted = self.wanted
         denoised = self._denoised() if wanted.denoise else None
-        write_picture(wanted.path, self.session, wanted.aovs, wanted.exposure, wanted.curve, denoised)
+
+        def write_to(path: Path) -> None:
+            write_picture(path, self.session, wanted.aovs, wanted.exposure, wanted.curve, denoised)
+
+        try:
+            write_to(wanted.path)
+        except OutputError as error:
+            # It may have taken hours.
+            try:
+                rescued = Path(tempfile.mkdtemp(prefix="incpt-")) / wanted.path.name
+                write_to(rescued)
+            except (OSError, OutputError):
+                raise error from None
+            raise OutputError(f"{error}; the picture is in {rescued}") from None
 
     def _denoised(self) -> npt.NDArray[np.float32]:
         """(H, W, 3) the picture with as much of a denoised one as its noise asks for."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -155,3 +156,26 @@ def test_what_cannot_be_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     for path in ("folder.png", "missing/a.png"):
         with pytest.raises(OutputError):
             FinalSettings(tmp_path / path).check_place()
+
+
+def test_a_picture_that_cannot_be_written_is_rescued(
+    renderer: ThreadedRenderer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rescue = tmp_path / "rescue"
+    rescue.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(rescue))
+    renderer.show(View(SCENE, step_ms=2))
+    gone = tmp_path / "gone"
+    for has_room in (True, False):
+        gone.mkdir()
+        wanted = FinalSettings(gone / "a.exr", spp=1)
+        wanted.check_place()
+        gone.rmdir()
+        if not has_room:
+            monkeypatch.setattr(tempfile, "tempdir", str(gone))
+        renderer.request(RenderFinal(SCENE, wanted))
+        line = next(one.text for one in said_until(renderer, Problem) if isinstance(one, Problem))
+        assert line.startswith(str(gone / "a.exr"))
+        (written,) = rescue.rglob("a.exr")
+        assert line.endswith(f"; the picture is in {written}") == has_room
+    assert np.isfinite(read_exr(written)).all()
