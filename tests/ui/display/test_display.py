@@ -40,20 +40,6 @@ EDGE_PIXELS = 3
 """Pixels whose centre lies on an edge to within rounding may fall to either side."""
 
 
-@pytest.fixture(scope="module")
-def context() -> Iterator[Any]:
-    try:
-        made = moderngl.create_context(standalone=True, backend="egl", require=330)
-    except Exception as error:
-        if os.environ.get("CI"):
-            raise
-        pytest.skip(f"no offscreen OpenGL context can be made here: {error}")
-    # Left current it would keep a window's context, in another test, from becoming so.
-    with made:
-        yield made
-    made.release()
-
-
 class Screen:
     """A framebuffer of its own and a Display that draws into it."""
 

@@ -25,9 +25,7 @@ from incpt.ui.display import shading
 from incpt.viewer.renderer import Copy, Waiting
 
 if not os.environ.get("CI"):
-    moderngl = pytest.importorskip("moderngl", reason="the editor's packages are not installed")
-
-import moderngl
+    pytest.importorskip("moderngl", reason="the editor's packages are not installed")
 
 from incpt.ui.display.shading import Shading
 from incpt.ui.rect import Rect
@@ -35,19 +33,6 @@ from incpt.ui.rect import Rect
 SIZE = (88, 56)
 SCENE = mixed_scene(size=SIZE)
 BACKGROUND = np.round(np.array(shading._BACKGROUND) * 255)
-
-
-@pytest.fixture(scope="module")
-def context() -> Iterator[Any]:
-    try:
-        made = moderngl.create_context(standalone=True, backend="egl", require=330)
-    except Exception as error:
-        if os.environ.get("CI"):
-            raise
-        pytest.skip(f"no offscreen OpenGL context can be made here: {error}")
-    with made:
-        yield made
-    made.release()
 
 
 class Screen:
