@@ -20,7 +20,7 @@ FREE_VIEW = ""
 FORMATS = ((".png", "PNG, as it is shown"), (".exr", "OpenEXR, linear"))
 """The formats by their suffix, and how the dialog names them."""
 _LARGEST = 16384
-_LIMIT_TIP = "Of rendering: what edits take does not count. 0: as long as the samples take"
+_LIMIT_TIP = "Of rendering: what edits take does not count. Without one it takes as long as the samples do"
 _PASSES_TIP = "Base colour, normal, depth and object ids, as layers of the file"
 _DENOISE_TIP = "As far as there is noise; an OpenEXR file gets a layer of it"
 _NO_DENOISER = 'Open Image Denoise is not installed; run: pip install "incpt[denoise]"'
@@ -95,7 +95,14 @@ class RenderDialog:
         choice = self.order.choice
         spp = widgets.whole_number("Samples", choice.spp, low=1, high=1 << 20, speed=1.0, tip="Per pixel")
         seconds = widgets.number(
-            "Time limit", choice.seconds, high=1e6, speed=0.5, unit=" s", decimals=0, tip=_LIMIT_TIP
+            "Time limit",
+            choice.seconds,
+            high=1e6,
+            speed=0.5,
+            unit=" s",
+            decimals=0,
+            tip=_LIMIT_TIP,
+            zero="none",
         )
         suffix = widgets.choice("Format", choice.suffix, FORMATS)
         denoised = widgets.checkbox("Denoise", choice.denoise and denoise.is_available(), _DENOISE_TIP)

@@ -56,13 +56,15 @@ def number(
     decimals: int = 3,
     tip: str = "",
     logarithmic: bool = False,
+    zero: str = "",
 ) -> float:
-    """A number to drag, or to type after a double click. `low` and `high` bound the drag only."""
+    """A number to drag, or to type after a double click. `low` and `high` bound the drag only; `zero` stands
+    in place of 0."""
     if mixed.is_told(label, value):
         return value
     flags = imgui.SliderFlags_.logarithmic if logarithmic else imgui.SliderFlags_.none
     with row(label, tip) as field:
-        form = _form(label, decimals, unit)
+        form = zero if zero and value == 0 else _form(label, decimals, unit)
         changed, result = imgui.drag_float(field, value, speed, low, high, form, flags)
         _note(label, changed)
     return result if changed else value
