@@ -34,6 +34,8 @@ _SAMPLES = 1024
 _STRETCHED_SAMPLES = _GLASS_SAMPLES = 512
 _SHEEN_COSINES, _SHEEN_ANGLES = 128, 32
 """Points of the sums over the hemisphere."""
+GLASS_TABLE_SHAPE = (GLASS_STEPS, GLASS_STEPS, GLASS_STEPS, 2)
+"""See `glass_table`."""
 
 
 @lru_cache(maxsize=1)
@@ -118,7 +120,7 @@ def stretched_rows() -> npt.NDArray[np.float32]:
 
 @lru_cache(maxsize=1)
 def glass_table() -> npt.NDArray[np.float32]:
-    """(GLASS_STEPS, GLASS_STEPS, GLASS_STEPS, 2): the share of the light that a rough boundary reflects or
+    """GLASS_TABLE_SHAPE: the share of the light that a rough boundary reflects or
     lets through at once, by (eta - 1) / (eta + 1) from -1/2 to 1/2, roughness from 0 to 1, and root of the
     cosine from 0 to 1: of one that reflects totally or not at all, and of one that reflects as Fresnel says.
     The rest meets more microfacets.

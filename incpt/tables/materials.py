@@ -108,14 +108,16 @@ def material_tables(
     opaque = [material for material in materials.values() if material.transmission < 1]
     traits = sum(1 << trait for trait in set().union(*map(traits_of, materials.values())))
     is_media_smooth = all(material.roughness**2 <= layout.MIN_ALPHA for material in media)
-    unused = np.zeros(1, np.float32)
     is_stretched = bool(traits >> MaterialTrait.ANISOTROPY & 1)
     return MaterialTables(
         {
             "materials": device.upload(rows),
             "layers": device.upload(layers),
-            "stretched": device.upload(albedo.stretched_rows() if is_stretched else unused),
-            "glass": device.upload(unused if is_media_smooth else albedo.glass_table()),
+            "stretched": device.upload(albedo.stretched_rows() if is_stretched else np.zeros(1, np.float32)),
+            # Kernels that serve rough glass too read it for smooth glass, and drop what they read.
+            "glass": device.upload(
+                np.zeros(albedo.GLASS_TABLE_SHAPE, np.float32) if is_media_smooth else albedo.glass_table()
+            ),
         },
         traits=traits,
         has_media=bool(media),

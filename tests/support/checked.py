@@ -102,6 +102,18 @@ def flat_box() -> Scene:
     return Scene(Camera((0, 0, 3), (0, 0, 0)), Environment((1, 1, 1)), materials, objects)
 
 
+def smooth_box() -> Scene:
+    """A box of glass that is smooth: the wavefront has no kernels of its own for that, and asks as for rough
+    glass."""
+    materials = {"glass": Material(roughness=0, transmission=1)}
+    return Scene(
+        Camera((0, 0, 3), (0, 0, 0)),
+        Environment((1, 1, 1)),
+        materials,
+        (Object("box", shape("cube"), "glass"),),
+    )
+
+
 def everything() -> Scene:
     """What kernels can be asked for, at once: walls and rough glass that absorbs, every layer, textures,
     holes, colours of vertices, lights of every kind beside those of triangles, a sky and its sun, and a lens.
@@ -151,7 +163,12 @@ def coloured_ball() -> Mesh:
     return Mesh(0.5 * ball.vertices, ball.faces, corners, colors=np.full((*corners.shape[:2], 4), 0.5))
 
 
-SCENES: dict[str, Any] = {"empty": empty_glass, "flat": flat_box, "everything": everything}
+SCENES: dict[str, Any] = {
+    "empty": empty_glass,
+    "flat": flat_box,
+    "smooth": smooth_box,
+    "everything": everything,
+}
 
 
 def check(by: str, schedule: str, name: str) -> None:
